@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// outcrop-base: the operator's end of Outcrop.
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <opencv2/core.hpp>
+
+#include "config.h"
+#include "live.h"
+#include "replay.h"
+
+namespace {
+
+void say(const std::string &text)
+{
+    std::printf("outcrop-base: %s\n", text.c_str());
+    std::fflush(stdout);
+}
+
+int live(const std::string &file)
+{
+    oc_base_config_t config;
+    char error[1024];
+    if (!oc_base_config_load(file.c_str(), &config, error, sizeof error)) throw std::runtime_error(error);
+    outcrop::run_live(config);
+    return 0;
+}
+
+int replay(outcrop::ReplayOptions options, const std::vector<double> &area)
+{
+    if (!area.empty()) {
+        options.area = outcrop::Area{area[0], area[1], area[2], area[3], area[4]};
+        if (!(area[0] < area[1] && area[2] < area[3] && area[4] > 0))
+            throw std::runtime_error("--area must be X_MIN,X_MAX,Y_MIN,Y_MAX,Z_MAX, ascending, in metres");
+    }
+    outcrop::run_replay(options, say);
+    say(options.output.dir + " written");
+    return 0;
+}
+
+} // namespace
+
+int main(int argc, char **argv)
+{
+    CLI::App app{"outcrop-base: the operator's end of Outcrop"};
+    app.set_version_flag("--version", "outcrop-base " OUTCROP_VERSION);
+    app.require_subcommand(1);
+
+    std::string config;
+    CLI::App *live_command = app.add_subcommand("live", "listen to a vehicle, write the run's folder when settled");
+    live_command->add_option("--config", config, "YAML file; keys in docs/operating.md")->required();
+
+    outcrop::ReplayOptions options;
+    std::vector<double> area;
+    CLI::App *replay_command = app.add_subcommand("replay", "the same on a captured LCM log");
+    replay_command->add_option("LOG", options.log, "LCM log with the channels OCD and OCU")->required();
+    replay_command->add_option("--out", options.output.dir, "folder to write")->required();
+    replay_command->add_option("--as", options.output.represent, "boxes or none")
+        ->check(CLI::IsMember({"boxes", "none"}));
+    replay_command->add_option("--path", options.output.path, "path file; default: a loop round the obstacles");
+    replay_command->add_option("--area", area, "working area X_MIN,X_MAX,Y_MIN,Y_MAX,Z_MAX in metres")
+        ->delimiter(',')
+        ->expected(5);
+    replay_command->add_option("--method", options.output.method, "best or thesis")
+        ->check(CLI::IsMember({"best", "thesis"}));
+    replay_command->add_option("--vehicle", options.vehicle, "id; default: the first in the log")
+        ->check(CLI::Range(0, 255));
+
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError &fault) {
+        const int code = app.exit(fault);
+        return code == 0 ? 0 : 2;
+    }
+    cv::setNumThreads(1); // sums in one order, whatever the machine
+    try {
+        return *live_command ? live(config) : replay(options, area);
+    } catch (const std::exception &fault) {
+        std::fprintf(stderr, "outcrop-base: %s\n", fault.what());
+        return 1;
+    }
+}

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Order of writing: model first, report last, so a reader that sees the report sees a finished run.
+#include "output.h"
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+#include <nlohmann/json.hpp>
+
+#include "site/export.h"
+#include "site/ground_map.h"
+#include "site/path.h"
+#include "site/sequence.h"
+
+namespace outcrop {
+namespace {
+
+using json = nlohmann::json;
+
+class Stopwatch {
+public:
+    double ms() const
+    {
+        return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin_).count();
+    }
+
+private:
+    std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
+
+json bytes_of(const Ledger &ledger, std::uint64_t LedgerLine::*field)
+{
+    json out = json::object();
+    for (const char *layer : {"view", "patch", "silhouette", "texture", "overhead", "request", "status"})
+        out[layer] = 0;
+    for (const auto &[layer, line] : ledger.lines()) out[layer] = line.*field;
+    out["total"] = ledger.total().*field;
+    return out;
+}
+
+json counts_of(Session &session, const ReceiveCounts &received)
+{
+    json out = json::object();
+    const SiteModel &model = session.model();
+    for (const auto &[name, value] : model.counts) out[name] = value;
+    std::size_t n_obstacle = 0, n_ground = 0;
+    for (const PairMatches &pair : model.pairs) {
+        for (const Match &match : pair.matches) (match.kind == MatchKind::kGround ? n_ground : n_obstacle)++;
+    }
+    out["views"] = session.views().size();
+    out["matches_obstacle"] = n_obstacle;
+    out["matches_ground"] = n_ground;
+    out["points"] = model.points.size();
+    out["obstacles"] = model.obstacles.size();
+    out["suspected"] = model.suspected.size();
+    out["tiles"] = session.tiles().size();
+    out["requests_given_up"] = session.given_up();
+    out["packets_ill_formed"] = received.ill_formed;
+    out["packets_foreign"] = received.foreign;
+    out["log_garbage_bytes"] = received.garbage_bytes;
+    out["log_is_cut"] = received.is_log_cut;
+    if (const auto &status = session.assembler().status()) {
+        static const char *const names[OC_N_COUNTERS] = {
+            "frames_in",        "frames_no_pose", "frames_not_key", "views_sent",    "views_dropped",
+            "junctions_capped", "requests_bad",   "requests_gone",  "requests_full", "send_failed"};
+        for (int i = 0; i < OC_N_COUNTERS; i++) out["vehicle"][names[i]] = status->counters[i];
+    }
+    return out;
+}
+
+void write_report(const std::string &path, const json &report)
+{
+    const std::string part = path + ".part";
+    {
+        std::ofstream file(part);
+        file << report.dump(1) << '\n';
+        if (!file.flush()) throw std::runtime_error(path + ": cannot be written");
+    }
+    std::filesystem::rename(part, path);
+}
+
+} // namespace
+
+SessionOptions session_options(const std::string &method)
+{
+    SessionOptions options;
+    if (method == "thesis") {
+        options.build.match = thesis_match_options();
+        options.build.cluster.z_weight = 1;
+    }
+    return options;
+}
+
+void write_output(Session &session, const Ledger &ledger, const ReceiveCounts &received, const OutputOptions &options,
+                  const Progress &progress)
+{
+    json ms = json::object();
+    std::filesystem::create_directories(options.dir);
+    Stopwatch settle_watch;
+    const SiteModel &model = session.settle();
+    ms["settle"] = settle_watch.ms();
+    for (const auto &[step, value] : model.ms) ms[step] = value;
+    progress("model: " + std::to_string(model.obstacles.size()) + " obstacles, " +
+             std::to_string(model.suspected.size()) + " suspected, " + std::to_string(model.points.size()) + " points");
+
+    Stopwatch map_watch;
+    const GroundMap ground = map_ground(model);
+    int n_bad_tiles = 0;
+    const OverheadMap overhead = compose_overhead(model, session.tiles(), {}, &n_bad_tiles);
+    ms["overhead"] = map_watch.ms();
+    write_model_dir(options.dir, model, session.views(), ground, overhead);
+
+    json sequence = nullptr;
+    if (options.represent != "none") {
+        Stopwatch watch;
+        const Path path = options.path.empty() ? loop_path(model) : read_path(options.path);
+        const SequenceReport done = write_sequence(
+            options.dir + "/sequence", options.represent, model, overhead, path, {}, [&](int frame, int frames) {
+                if (frame % 10 == 0 || frame == frames)
+                    progress("frame " + std::to_string(frame) + " of " + std::to_string(frames));
+            });
+        ms["sequence"] = watch.ms();
+        sequence = {{"as", options.represent}, {"frames", path.frames.size()}, {"video", done.has_video}};
+        if (!done.note.empty()) progress(done.note);
+    }
+
+    json report;
+    report["bytes"] = bytes_of(ledger, &LedgerLine::bytes);
+    report["bytes_ip"] = bytes_of(ledger, &LedgerLine::bytes_ip);
+    report["messages"] = bytes_of(ledger, &LedgerLine::messages);
+    report["ms"] = ms;
+    report["counts"] = counts_of(session, received);
+    report["counts"]["tiles_bad"] = n_bad_tiles;
+    report["options"] = {{"method", options.method}, {"path", options.path}, {"null_rival", session.is_null_rival()}};
+    if (const auto area = session.area())
+        report["options"]["area"] = {area->x_min, area->x_max, area->y_min, area->y_max, area->z_max};
+    report["sequence"] = sequence;
+    write_report(options.dir + "/report.json", report);
+}
+
+} // namespace outcrop

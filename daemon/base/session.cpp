@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Requests follow from what is known, so a complete link always ends with the same set of packets and one model.
+#include "session.h"
+
+#include <algorithm>
+
+namespace outcrop {
+namespace {
+
+std::size_t block_count(const View &view)
+{
+    const std::size_t across = (view.camera.k.width_px + OC_BLOCK_PX - 1) / OC_BLOCK_PX;
+    const std::size_t down = (view.camera.k.height_px + OC_BLOCK_PX - 1) / OC_BLOCK_PX;
+    return across * down;
+}
+
+bool is_block_known(const View &view, std::size_t block)
+{
+    const int across = static_cast<int>((view.camera.k.width_px + OC_BLOCK_PX - 1) / OC_BLOCK_PX);
+    const int x = static_cast<int>(block) % across * static_cast<int>(OC_BLOCK_PX);
+    const int y = static_cast<int>(block) / across * static_cast<int>(OC_BLOCK_PX);
+    return view.known(y, x) != 0;
+}
+
+} // namespace
+
+Session::Session(const SessionOptions &options, Send send) : options_(options), send_(std::move(send))
+{
+    AssembleOptions assemble;
+    assemble.vehicle = options.vehicle;
+    assembler_ = PacketAssembler(assemble);
+    vehicle_ = options.vehicle;
+}
+
+Session::~Session() = default;
+
+void Session::on_evidence(double now_s)
+{
+    has_news_ = true;
+    last_news_s_ = now_s;
+}
+
+FeedResult Session::receive(const std::uint8_t *packet, std::size_t n_bytes, double now_s)
+{
+    oc_packet_head_t head;
+    if (oc_packet_decode_head(packet, n_bytes, &head) != OC_OK) return assembler_.feed(packet, n_bytes);
+    if (vehicle_ < 0) vehicle_ = head.vehicle;
+    if (head.vehicle != vehicle_) return FeedResult::kForeign;
+
+    if (head.type == OC_PACKET_IMAGE) {
+        oc_image_piece_t piece;
+        if (oc_packet_decode_image(packet, n_bytes, &piece) != OC_OK) return assembler_.feed(packet, n_bytes);
+        if (!rival_) rival_ = std::make_unique<NullRival>();
+        if (rival_->take(piece)) is_model_current_ = false;
+        on_evidence(now_s);
+        return FeedResult::kTaken;
+    }
+    const FeedResult result = assembler_.feed(packet, n_bytes);
+    if (result != FeedResult::kTaken || head.type == OC_PACKET_STATUS) return result;
+    on_evidence(now_s);
+    if (head.type != OC_PACKET_OVERHEAD) {
+        is_model_current_ = is_plan_current_ = false;
+        if (phase_ != Phase::kGather) phase_ = Phase::kGather;
+    }
+    return result;
+}
+
+const std::map<int, View> &Session::views()
+{
+    return rival_ ? rival_views_ : assembler_.views();
+}
+
+const std::map<TileKey, TileBlob> &Session::tiles() const
+{
+    return rival_ ? rival_->tiles() : assembler_.tiles();
+}
+
+std::optional<Area> Session::area() const
+{
+    if (options_.area) return options_.area;
+    const auto &status = assembler_.status();
+    if (!status || !status->area.is_set) return std::nullopt;
+    const oc_area_t &a = status->area;
+    return Area{a.x_min, a.x_max, a.y_min, a.y_max, a.z_max};
+}
+
+bool Session::may_ask(Asked *asked, double now_s)
+{
+    if (asked->tries > 0 && now_s - asked->when_s < options_.retry_s) return false;
+    if (asked->tries > 0 && now_s - last_news_s_ < options_.quiet_s) return false;
+    if (asked->tries == options_.max_tries) {
+        asked->tries++;
+        n_given_up_++;
+    }
+    if (asked->tries > options_.max_tries) return false;
+    asked->when_s = now_s;
+    asked->tries++;
+    return true;
+}
+
+oc_packet_head_t Session::next_head()
+{
+    oc_packet_head_t head{};
+    head.vehicle = static_cast<std::uint8_t>(std::max(vehicle_, 0));
+    head.sequence = sequence_++;
+    return head;
+}
+
+// True while something is still expected.
+bool Session::ask_missing_parts(double now_s)
+{
+    const auto missing = rival_ ? rival_->missing(assembler_.status()) : assembler_.missing();
+    bool is_waiting = false;
+    for (const auto &[view, parts] : missing) {
+        Asked &asked = asked_parts_[view];
+        if (asked.tries > options_.max_tries) continue;
+        is_waiting = true;
+        if (!may_ask(&asked, now_s)) continue;
+        const oc_resend_request_t request{static_cast<std::uint16_t>(view), parts};
+        const oc_packet_head_t head = next_head();
+        std::uint8_t buf[OC_MAX_DATAGRAM_BYTES];
+        std::size_t n_bytes = 0;
+        if (oc_packet_encode_resend(&head, &request, buf, options_.datagram_bytes, &n_bytes) == OC_OK)
+            send_(buf, n_bytes);
+    }
+    return is_waiting;
+}
+
+// What the views seen so far call for joins what was called for before.
+void Session::plan_blocks()
+{
+    is_plan_current_ = true;
+    const auto &views = assembler_.views();
+    std::vector<View> list;
+    for (const auto &[id, view] : views) list.push_back(view);
+    if (list.size() < 2) return;
+    std::vector<PosedView> posed;
+    std::vector<std::vector<std::uint8_t>> asked;
+    for (const View &view : list) {
+        posed.push_back(as_reported(view));
+        auto &flags = wanted_[view.id];
+        flags.resize(block_count(view), 0);
+        asked.push_back(flags);
+    }
+    const Area where = area().value_or(derive_area(list, options_.build));
+    const auto pairs = select_pairs(posed, where, options_.build.pairs);
+    for (const WantedBlocks &more : wanted_blocks(posed, pairs, where, asked, options_.wanted)) {
+        auto &flags = wanted_[more.view];
+        for (const std::uint16_t block : more.blocks) flags[block] = 1;
+        asked_blocks_[more.view] = Asked{};
+    }
+}
+
+void Session::send_blocks(int view, const std::vector<std::uint16_t> &blocks)
+{
+    std::size_t at = 0;
+    while (at < blocks.size()) {
+        oc_patch_request_t request{};
+        request.view = static_cast<std::uint16_t>(view);
+        request.quality = static_cast<std::uint8_t>(options_.patch_quality);
+        const std::size_t n = std::min<std::size_t>(blocks.size() - at, OC_MAX_PACKET_BLOCKS);
+        request.n_blocks = static_cast<std::uint16_t>(n);
+        std::copy_n(blocks.begin() + static_cast<std::ptrdiff_t>(at), n, request.blocks);
+        const oc_packet_head_t head = next_head();
+        std::uint8_t buf[OC_MAX_DATAGRAM_BYTES];
+        std::size_t n_bytes = 0;
+        std::uint16_t taken = 0;
+        if (oc_packet_encode_patch_request(&head, &request, buf, options_.datagram_bytes, &n_bytes, &taken) != OC_OK ||
+            taken == 0)
+            return;
+        send_(buf, n_bytes);
+        at += taken;
+    }
+}
+
+bool Session::ask_blocks(double now_s)
+{
+    if (!is_plan_current_) plan_blocks();
+    bool is_waiting = false;
+    for (const auto &[id, view] : assembler_.views()) {
+        const auto wanted = wanted_.find(id);
+        if (wanted == wanted_.end()) continue;
+        std::vector<std::uint16_t> blocks;
+        for (std::size_t i = 0; i < wanted->second.size(); i++) {
+            if (wanted->second[i] && !is_block_known(view, i)) blocks.push_back(static_cast<std::uint16_t>(i));
+        }
+        Asked &asked = asked_blocks_[id];
+        if (blocks.empty() || asked.tries > options_.max_tries) continue;
+        is_waiting = true;
+        if (may_ask(&asked, now_s)) send_blocks(id, blocks);
+    }
+    return is_waiting;
+}
+
+void Session::send_tiles(const TileRequest &plan)
+{
+    std::size_t at = 0;
+    while (at < plan.tiles.size()) {
+        oc_overhead_request_t request{};
+        request.view = static_cast<std::uint16_t>(plan.view);
+        std::copy(plan.image_from_ground.begin(), plan.image_from_ground.end(), request.image_from_ground);
+        request.metres_per_pixel = plan.metres_per_pixel;
+        request.tile_px = static_cast<std::uint16_t>(plan.tile_px);
+        request.quality = static_cast<std::uint8_t>(plan.quality);
+        const std::size_t n = std::min<std::size_t>(plan.tiles.size() - at, OC_MAX_REQUEST_TILES);
+        request.n_tiles = static_cast<std::uint16_t>(n);
+        std::copy_n(plan.tiles.begin() + static_cast<std::ptrdiff_t>(at), n, request.tiles);
+        const oc_packet_head_t head = next_head();
+        std::uint8_t buf[OC_MAX_DATAGRAM_BYTES];
+        std::size_t n_bytes = 0;
+        std::uint16_t taken = 0;
+        if (oc_packet_encode_overhead_request(&head, &request, buf, options_.datagram_bytes, &n_bytes, &taken) !=
+                OC_OK ||
+            taken == 0)
+            return;
+        send_(buf, n_bytes);
+        at += taken;
+    }
+}
+
+bool Session::ask_tiles(double now_s)
+{
+    if (rival_) {
+        rival_->make_tiles(tile_plan_);
+        return false;
+    }
+    bool is_waiting = false;
+    for (const TileRequest &plan : tile_plan_) {
+        TileRequest left = plan;
+        left.tiles.clear();
+        for (const oc_tile_id_t tile : plan.tiles) {
+            TileKey key;
+            key.view = static_cast<std::uint16_t>(plan.view);
+            key.ix = tile.ix;
+            key.iy = tile.iy;
+            key.tile_px = static_cast<std::uint16_t>(plan.tile_px);
+            key.metres_per_pixel = static_cast<double>(static_cast<float>(plan.metres_per_pixel));
+            if (assembler_.tiles().count(key) == 0) left.tiles.push_back(tile);
+        }
+        Asked &asked = asked_tiles_[plan.view];
+        if (left.tiles.empty() || asked.tries > options_.max_tries) continue;
+        is_waiting = true;
+        if (may_ask(&asked, now_s)) send_tiles(left);
+    }
+    return is_waiting;
+}
+
+bool Session::is_source_done(double now_s) const
+{
+    const auto &status = assembler_.status();
+    return (status && status->is_source_done) || now_s - last_news_s_ > options_.settle_quiet_s;
+}
+
+const SiteModel &Session::settle()
+{
+    if (is_model_current_) return model_;
+    if (rival_) rival_views_ = rival_->make_views(area());
+    std::vector<View> list;
+    for (const auto &[id, view] : views()) list.push_back(view);
+    model_ = build_site(list, area(), options_.build);
+    is_model_current_ = true;
+    return model_;
+}
+
+void Session::step(double now_s)
+{
+    if (!send_ || !has_news_ || phase_ == Phase::kSettled) return;
+    const bool is_quiet = now_s - last_news_s_ >= options_.quiet_s;
+    if (!is_quiet && now_s - last_plan_s_ < options_.longest_wait_s) return;
+    last_plan_s_ = now_s;
+
+    if (phase_ == Phase::kGather) {
+        bool is_waiting = ask_missing_parts(now_s);
+        if (!rival_) is_waiting = ask_blocks(now_s) || is_waiting;
+        if (is_waiting || !is_source_done(now_s)) return;
+        settle();
+        tile_plan_ = plan_overhead(model_, options_.overhead);
+        asked_tiles_.clear();
+        phase_ = Phase::kOverhead;
+    }
+    if (phase_ == Phase::kOverhead && !ask_tiles(now_s)) phase_ = Phase::kSettled;
+}
+
+} // namespace outcrop

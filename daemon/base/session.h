@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the base does with packets: gathers views, asks for what it needs, settles the model.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "null_rival.h"
+#include "site/assemble.h"
+#include "site/model.h"
+#include "site/overhead.h"
+#include "site/wanted_blocks.h"
+
+namespace outcrop {
+
+struct SessionOptions {
+    int vehicle = -1;               // listen to this one only; -1: the first that is heard
+    unsigned datagram_bytes = 1380; // of requests
+    std::optional<Area> area;       // before what the vehicle says, before what the views share
+    BuildOptions build;
+    OverheadOptions overhead;
+    WantedBlocksOptions wanted;
+    int patch_quality = 16;      // 1..31
+    double quiet_s = 0.25;       // without packets before more is asked for
+    double longest_wait_s = 2.0; // or after so long while packets keep coming
+    double retry_s = 1.0;        // unanswered requests are repeated after this
+    int max_tries = 6;           // and given up after so many
+    double settle_quiet_s = 3.0; // an endless source settles after so long without news
+};
+
+// A state machine without clock and network: time comes in with every call,
+// requests go out through `send`. One thread.
+class Session {
+public:
+    using Send = std::function<void(const std::uint8_t *packet, std::size_t n_bytes)>;
+
+    // send may be empty: nothing is asked for then (replay).
+    Session(const SessionOptions &options, Send send);
+    ~Session();
+
+    // One packet of the downlink. Returns what became of it.
+    FeedResult receive(const std::uint8_t *packet, std::size_t n_bytes, double now_s);
+
+    // Do what is due: resend, patch and overhead requests, solving. Call it every 50 ms or so.
+    void step(double now_s);
+
+    // The vehicle's source has ended (or been quiet for long), everything asked
+    // for has come or been given up, and model() is of all that came.
+    bool is_settled() const { return phase_ == Phase::kSettled; }
+
+    // Solve now from all that has come. The model is a pure function of the set of packets.
+    const SiteModel &settle();
+
+    const std::map<int, View> &views();
+    const SiteModel &model() const { return model_; }
+    const std::map<TileKey, TileBlob> &tiles() const;
+    const PacketAssembler &assembler() const { return assembler_; }
+    std::optional<Area> area() const;
+    std::uint64_t given_up() const { return n_given_up_; }
+    bool is_null_rival() const { return rival_ != nullptr; }
+
+private:
+    enum class Phase { kGather, kOverhead, kSettled };
+    struct Asked {
+        double when_s = 0;
+        int tries = 0;
+    };
+
+    void on_evidence(double now_s);
+    bool ask_missing_parts(double now_s);
+    bool ask_blocks(double now_s);
+    bool ask_tiles(double now_s);
+    void plan_blocks();
+    void send_blocks(int view, const std::vector<std::uint16_t> &blocks);
+    void send_tiles(const TileRequest &request);
+    bool may_ask(Asked *asked, double now_s);
+    bool is_source_done(double now_s) const;
+    oc_packet_head_t next_head();
+
+    SessionOptions options_;
+    Send send_;
+    PacketAssembler assembler_;
+    std::unique_ptr<NullRival> rival_;
+    std::map<int, View> rival_views_;
+    Phase phase_ = Phase::kGather;
+    SiteModel model_;
+    bool is_model_current_ = false;
+    bool is_plan_current_ = false;
+
+    std::map<int, std::vector<std::uint8_t>> wanted_; // per view one byte per block, 1: wanted
+    std::map<int, Asked> asked_blocks_, asked_parts_, asked_tiles_;
+    std::vector<TileRequest> tile_plan_;
+    std::uint64_t n_given_up_ = 0;
+    std::uint16_t sequence_ = 0;
+    int vehicle_ = -1;
+    double last_news_s_ = 0, last_plan_s_ = 0;
+    bool has_news_ = false;
+};
+
+} // namespace outcrop

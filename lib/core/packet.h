@@ -1,0 +1,274 @@
+/* SPDX-License-Identifier: BSD-3-Clause
+ * Packets: everything that crosses the link, as values, and their wire form.
+ *
+ * One datagram = one packet: 4-byte head (version and type, vehicle, sequence
+ * number), body, CRC-16. Each decodes alone. The wire form bit by bit, the
+ * quantisation and the invariants that decoding guarantees: docs/protocol.md.
+ *
+ * Decoders trust nothing: lengths, counts, ranges, versions and the CRC are
+ * checked, and on failure the output is untouched. Decoding what was encoded
+ * gives the quantised values back, exactly. */
+#ifndef OUTCROP_CORE_PACKET_H
+#define OUTCROP_CORE_PACKET_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/camera.h"
+#include "core/image.h"
+#include "core/junction.h"
+#include "core/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define OC_WIRE_VERSION 0u
+
+/* Datagram sizes that a link may be configured to, bytes of packet. */
+#define OC_MIN_DATAGRAM_BYTES 200u
+#define OC_MAX_DATAGRAM_BYTES 1380u
+
+/* Ground ties one view may carry. */
+#define OC_MAX_TIES 96u
+
+/* Side of the pixel blocks of the patch layer. */
+#define OC_BLOCK_PX 8u
+
+/* Blocks one patch packet or request may name. */
+#define OC_MAX_PACKET_BLOCKS 512u
+
+/* Tiles one overhead request may name. */
+#define OC_MAX_REQUEST_TILES 64u
+
+typedef enum oc_packet_type {
+    /* vehicle to base */
+    OC_PACKET_VIEW = 1,
+    OC_PACKET_PATCH = 2,
+    OC_PACKET_SILHOUETTE = 3, /* kept for the silhouette layer; refused in version 0 */
+    OC_PACKET_TEXTURE = 4,    /* kept for the texture layer; refused in version 0 */
+    OC_PACKET_OVERHEAD = 5,
+    OC_PACKET_STATUS = 6,
+    OC_PACKET_RELABEL = 7,
+    OC_PACKET_ANNOUNCE = 8, /* a keyframe that adds no evidence and is not sent */
+    OC_PACKET_IMAGE = 9,    /* the null rival: a piece of a whole compressed keyframe */
+    /* base to vehicle */
+    OC_PACKET_RESEND_REQUEST = 16,
+    OC_PACKET_PATCH_REQUEST = 17,
+    OC_PACKET_OVERHEAD_REQUEST = 18,
+    OC_PACKET_SILHOUETTE_REQUEST = 19, /* kept; refused in version 0 */
+    OC_PACKET_TEXTURE_REQUEST = 20     /* kept; refused in version 0 */
+} oc_packet_type_t;
+
+typedef struct oc_packet_head {
+    uint8_t type; /* oc_packet_type_t */
+    uint8_t vehicle;
+    uint16_t sequence; /* per direction, wraps */
+} oc_packet_head_t;
+
+/* What every part of a view repeats, so that each decodes alone. Wire
+ * quantisation: centre 0.1 mm, rotation 2e-6 rad rms, margins half floats (rounded up),
+ * intrinsics float32. */
+typedef struct oc_view_head {
+    uint16_t view; /* id given by the vehicle, ascending in capture order */
+    uint8_t camera_index;
+    uint8_t part; /* 0.. */
+    bool is_last; /* no part follows */
+    int64_t utime_us;
+    oc_camera_t camera; /* of the rectified image, pose as the sensor reports it */
+    oc_margin_t margin;
+    bool has_distortion;
+    oc_distortion_t distortion; /* what rectification took away; for showing pixels of the raw image */
+} oc_view_head_t;
+
+/* One point of the ground seen in this view and in an earlier one. */
+typedef struct oc_tie {
+    uint16_t ref_view;
+    float x_px, y_px;         /* in this view; 1/16 px on the wire */
+    float ref_x_px, ref_y_px; /* in ref_view */
+} oc_tie_t;
+
+/* A part of a view packet: a run of its junctions and ties. Position quantum
+ * 1/8 px, angle quantum 2 pi / 512. Length, strength and score do not travel. */
+typedef struct oc_view_part {
+    oc_view_head_t head;
+    uint16_t first_junction; /* index of junctions[0] in the view's transmit order */
+    uint16_t n_junctions;
+    uint16_t n_ties;
+    oc_junction_t junctions[OC_MAX_JUNCTIONS];
+    oc_tie_t ties[OC_MAX_TIES];
+} oc_view_part_t;
+
+/* New labels for the junctions [first, first + n) of a view already sent. */
+typedef struct oc_relabel {
+    uint16_t view;
+    uint16_t first, n;
+    uint8_t labels[OC_MAX_JUNCTIONS]; /* oc_label_t */
+} oc_relabel_t;
+
+/* Indices of 8x8 blocks of a view, raster order, ascending:
+ * index = by * ceil(width / 8) + bx. */
+typedef struct oc_patch_request {
+    uint16_t view;
+    uint8_t quality; /* 1 (coarse) .. 31 (fine) */
+    uint16_t n_blocks;
+    uint16_t blocks[OC_MAX_PACKET_BLOCKS];
+} oc_patch_request_t;
+
+/* Pixels of blocks of a view's grey rectified image, block-coded (core/blocks.h). */
+typedef struct oc_patch {
+    uint16_t view;
+    uint8_t quality;
+    uint16_t blocks_per_row; /* ceil(width / 8) of the image it was cut from */
+    uint16_t n_blocks;
+    uint16_t blocks[OC_MAX_PACKET_BLOCKS];
+    uint8_t px[OC_MAX_PACKET_BLOCKS][OC_BLOCK_PX * OC_BLOCK_PX];
+} oc_patch_t;
+
+/* One ground tile seen from one view. Tile (ix, iy) covers
+ * x in [ix, ix + 1) * tile_px * metres_per_pixel, y alike, row 0 at the
+ * largest y; pixel (c, r) has its centre at
+ * ((ix * tile_px + c + 0.5), ((iy + 1) * tile_px - r - 0.5)) * metres_per_pixel. */
+typedef struct oc_tile_id {
+    int16_t ix, iy;
+} oc_tile_id_t;
+
+typedef struct oc_overhead_request {
+    uint16_t view;
+    double image_from_ground[9]; /* the base's refined planar perspective matrix; float32 on the wire */
+    double metres_per_pixel;     /* float32 on the wire */
+    uint16_t tile_px;            /* 16..256 */
+    uint8_t quality;             /* codec quality to start from, 1..100; the vehicle lowers it until the tile fits a datagram */
+    uint16_t n_tiles;
+    oc_tile_id_t tiles[OC_MAX_REQUEST_TILES];
+} oc_overhead_request_t;
+
+typedef enum oc_codec { OC_CODEC_JPEG = 1, OC_CODEC_WEBP = 2, OC_CODEC_AVIF = 3 } oc_codec_t;
+
+typedef struct oc_overhead {
+    uint16_t view;
+    double metres_per_pixel;
+    uint16_t tile_px;
+    oc_tile_id_t tile;
+    uint8_t codec; /* oc_codec_t */
+    uint16_t n_bytes;
+    const uint8_t *bytes; /* encode: the caller's; decode: into the datagram */
+} oc_overhead_t;
+
+typedef struct oc_image_piece {
+    oc_view_head_t head; /* part = index of the piece, is_last on the final one */
+    uint8_t codec;
+    uint32_t total_bytes, offset_bytes;
+    uint16_t n_bytes;
+    const uint8_t *bytes;
+} oc_image_piece_t;
+
+typedef struct oc_announce {
+    uint16_t view;
+    int64_t utime_us;
+} oc_announce_t;
+
+/* Ask for parts of a view again; bit i of parts = part i; all ones = everything. */
+typedef struct oc_resend_request {
+    uint16_t view;
+    uint32_t parts;
+} oc_resend_request_t;
+
+/* Counters of things that were dropped on the way, in the order of docs/operating.md. */
+typedef enum oc_counter {
+    OC_COUNT_FRAMES_IN,
+    OC_COUNT_FRAMES_NO_POSE,
+    OC_COUNT_FRAMES_NOT_KEY,
+    OC_COUNT_VIEWS_SENT,
+    OC_COUNT_VIEWS_DROPPED,
+    OC_COUNT_JUNCTIONS_CAPPED,
+    OC_COUNT_REQUESTS_BAD,
+    OC_COUNT_REQUESTS_GONE,
+    OC_COUNT_REQUESTS_FULL,
+    OC_COUNT_SEND_FAILED,
+    OC_N_COUNTERS
+} oc_counter_t;
+
+/* Where the operator works, metres. Junctions that cannot lie in it stay off the link. */
+typedef struct oc_area {
+    bool is_set;
+    double x_min, x_max, y_min, y_max, z_max;
+} oc_area_t;
+
+typedef struct oc_vehicle_status {
+    uint32_t uptime_s;
+    uint16_t n_views;     /* views and announcements given out so far */
+    uint16_t newest_view; /* valid when n_views > 0 */
+    bool is_source_done;  /* a site folder has been played to its end */
+    uint32_t bytes_sent;  /* packets, without LCM's overhead */
+    oc_area_t area;       /* float32 on the wire; the base falls back on it */
+    uint32_t counters[OC_N_COUNTERS]; /* saturate at 65535 on the wire */
+} oc_vehicle_status_t;
+
+/* ---- encoding: vehicle ----
+ * Each writes one datagram of at most cap bytes to buf and its length to
+ * n_bytes. OC_E_SPACE when not even the smallest useful packet fits,
+ * OC_E_ARG when a value is out of the wire's range or not a number. */
+
+/* Encode the part that starts with junction `first` and tie `first_tie`.
+ * junctions [first, n_junctions) must be in order of worth, best first; the
+ * ones taken (and only these) are sorted in place into raster order and
+ * replaced by their quantised selves, so the caller's array ends up in the
+ * transmit order that the base sees. Ties are taken after junctions fill, but
+ * at least a quarter of the room is kept for them while any are left.
+ * Sets part->is_last by itself; head->part is the caller's. */
+OC_CHECKED oc_status_t oc_packet_encode_view(const oc_packet_head_t *packet, const oc_view_head_t *head,
+                                             oc_junction_t junctions[], uint16_t n_junctions, uint16_t first,
+                                             const oc_tie_t ties[], uint16_t n_ties, uint16_t first_tie,
+                                             uint8_t *buf, size_t cap, size_t *n_bytes,
+                                             uint16_t *junctions_taken, uint16_t *ties_taken);
+OC_CHECKED oc_status_t oc_packet_encode_relabel(const oc_packet_head_t *packet, const oc_relabel_t *relabel,
+                                                uint8_t *buf, size_t cap, size_t *n_bytes);
+/* As many of the n_blocks as fit, from the first on; grey is the view's image. */
+OC_CHECKED oc_status_t oc_packet_encode_patch(const oc_packet_head_t *packet, uint16_t view, uint8_t quality,
+                                              const oc_image_t *grey, const uint16_t blocks[], uint16_t n_blocks,
+                                              uint8_t *buf, size_t cap, size_t *n_bytes, uint16_t *blocks_taken);
+OC_CHECKED oc_status_t oc_packet_encode_overhead(const oc_packet_head_t *packet, const oc_overhead_t *overhead,
+                                                 uint8_t *buf, size_t cap, size_t *n_bytes);
+/* As many of piece->n_bytes as fit; writes how many. is_last is set when they reach total_bytes. */
+OC_CHECKED oc_status_t oc_packet_encode_image(const oc_packet_head_t *packet, const oc_image_piece_t *piece,
+                                              uint8_t *buf, size_t cap, size_t *n_bytes, uint16_t *bytes_taken);
+OC_CHECKED oc_status_t oc_packet_encode_announce(const oc_packet_head_t *packet, const oc_announce_t *announce,
+                                                 uint8_t *buf, size_t cap, size_t *n_bytes);
+OC_CHECKED oc_status_t oc_packet_encode_status(const oc_packet_head_t *packet, const oc_vehicle_status_t *status,
+                                               uint8_t *buf, size_t cap, size_t *n_bytes);
+
+/* ---- encoding: base ---- */
+OC_CHECKED oc_status_t oc_packet_encode_resend(const oc_packet_head_t *packet, const oc_resend_request_t *request,
+                                               uint8_t *buf, size_t cap, size_t *n_bytes);
+/* As many blocks as fit. */
+OC_CHECKED oc_status_t oc_packet_encode_patch_request(const oc_packet_head_t *packet,
+                                                      const oc_patch_request_t *request, uint8_t *buf, size_t cap,
+                                                      size_t *n_bytes, uint16_t *blocks_taken);
+/* As many tiles as fit. */
+OC_CHECKED oc_status_t oc_packet_encode_overhead_request(const oc_packet_head_t *packet,
+                                                         const oc_overhead_request_t *request, uint8_t *buf,
+                                                         size_t cap, size_t *n_bytes, uint16_t *tiles_taken);
+
+/* ---- decoding ----
+ * head first (checks length, version, type, CRC), then the body by its type.
+ * OC_E_FORMAT for anything that docs/protocol.md does not allow. */
+OC_CHECKED oc_status_t oc_packet_decode_head(const uint8_t *buf, size_t n_bytes, oc_packet_head_t *head);
+OC_CHECKED oc_status_t oc_packet_decode_view(const uint8_t *buf, size_t n_bytes, oc_view_part_t *part);
+OC_CHECKED oc_status_t oc_packet_decode_relabel(const uint8_t *buf, size_t n_bytes, oc_relabel_t *relabel);
+OC_CHECKED oc_status_t oc_packet_decode_patch(const uint8_t *buf, size_t n_bytes, oc_patch_t *patch);
+OC_CHECKED oc_status_t oc_packet_decode_overhead(const uint8_t *buf, size_t n_bytes, oc_overhead_t *overhead);
+OC_CHECKED oc_status_t oc_packet_decode_image(const uint8_t *buf, size_t n_bytes, oc_image_piece_t *piece);
+OC_CHECKED oc_status_t oc_packet_decode_announce(const uint8_t *buf, size_t n_bytes, oc_announce_t *announce);
+OC_CHECKED oc_status_t oc_packet_decode_status(const uint8_t *buf, size_t n_bytes, oc_vehicle_status_t *status);
+OC_CHECKED oc_status_t oc_packet_decode_resend(const uint8_t *buf, size_t n_bytes, oc_resend_request_t *request);
+OC_CHECKED oc_status_t oc_packet_decode_patch_request(const uint8_t *buf, size_t n_bytes,
+                                                      oc_patch_request_t *request);
+OC_CHECKED oc_status_t oc_packet_decode_overhead_request(const uint8_t *buf, size_t n_bytes,
+                                                         oc_overhead_request_t *request);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: BSD-3-Clause
+ * Parts of the ground filter: the refined homography of a pair, and correlation under a homography. */
+#ifndef OUTCROP_VEHICLE_GROUND_INTERNAL_H
+#define OUTCROP_VEHICLE_GROUND_INTERNAL_H
+
+#include "core/window.h"
+#include "vehicle/ground.h"
+
+#define GROUND_PARAMS 12
+
+/* Sides of a look-up: the junction's patch is sought this far round its place. */
+#define GROUND_SEARCH_PX 3
+#define GROUND_MAX_WIDE_PX (OC_MAX_GROUND_WINDOW_PX + 2u * GROUND_SEARCH_PX)
+
+/* ---- the pair's geometry (ground_homography.c) ---- */
+
+/* Two cameras moved inside their margins so that the ground matches agree. */
+typedef struct ground_pair {
+    oc_camera_t left, right;                  /* refined */
+    double H[9], H_inv[9];                    /* ground homography of the refined cameras */
+    double u[GROUND_PARAMS];                  /* moves, in standard deviations of the margins */
+    double dH[GROUND_PARAMS][9];              /* of H, per unit of u */
+    double cov[GROUND_PARAMS][GROUND_PARAMS]; /* of u after the fit */
+} ground_pair_t;
+
+/* Find the largest set of matches that one homography explains and refine the
+ * pair with it: marks ws->is_inlier, fills result and pair. Leaves
+ * result->is_refined false when there is no such set or the poses would have
+ * to leave their margins for it. */
+void oc_ground_refine(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
+                      const oc_ground_view_t *reference, ground_pair_t *pair, oc_ground_result_t *result);
+
+/* Fit the pair again, to the matches that ws has now. False, and pair and
+ * result as they were, when too few of them agree. */
+bool oc_ground_refit(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
+                     const oc_ground_view_t *reference, ground_pair_t *pair, oc_ground_result_t *result);
+
+/* Standard deviation of a left pixel's transfer after the fit, the larger axis, right pixels. */
+double oc_ground_transfer_sigma_px(const ground_pair_t *pair, double x_px, double y_px);
+
+/* Move of the right pixel, px, when the point seen at a left pixel rises from the ground to
+ * height z_m. OC_E_DEGENERATE when there is no such point in front of both. */
+OC_CHECKED oc_status_t oc_ground_rise(const ground_pair_t *pair, double x_px, double y_px, double z_m,
+                                      double rise_px[2]);
+
+/* ---- correlation (ground_correlate.c) ---- */
+
+/* A square window of n x n samples, n odd, of zero mean and unit length. */
+typedef struct ground_patch {
+    uint32_t n;
+    float sd; /* standard deviation before, grey levels */
+    float v[OC_MAX_GROUND_WINDOW_PX * OC_MAX_GROUND_WINDOW_PX];
+} ground_patch_t;
+
+/* The image's own window round (x, y). False when it does not fit inside. */
+bool oc_ground_patch_take(const oc_image_t *grey, double x_px, double y_px, uint32_t n, ground_patch_t *patch);
+
+/* Correlation of a patch, taken round `at`, with the image that H' leads to
+ * from there, H' being H anchored to send `at` to `to` (thesis Eq 4.36-4.40). -1 when the
+ * window is not wholly inside, or a quick look at every third sample is hopeless. */
+float oc_ground_correlate(const ground_patch_t *patch, const double at[2], const oc_image_t *grey, const double H[9],
+                          const double to[2]);
+
+/* Where a patch is best found round the place H sends it to. */
+typedef struct ground_lookup {
+    bool is_inside;     /* the sought window was wholly inside */
+    float ncc;          /* at the peak */
+    float sd;           /* of the sought window there, grey levels */
+    float dx_px, dy_px; /* peak from the expected place, pixels of the patch's own image, sub-pixel */
+} ground_lookup_t;
+
+void oc_ground_look_up(const ground_patch_t *patch, const double at[2], const oc_image_t *grey, const double H[9],
+                       ground_lookup_t *found);
+
+#endif

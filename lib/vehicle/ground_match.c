@@ -1,0 +1,314 @@
+/* SPDX-License-Identifier: BSD-3-Clause
+ * Ground filter of one pair of views: both passes and the votes. */
+#include <math.h>
+#include <string.h>
+
+#include "core/homography.h"
+#include "core/mat3.h"
+#include "core/plane.h"
+#include "vehicle/ground_internal.h"
+
+/* Pairs correlated in one pass; keeps the time of absurdly wide margins bounded. */
+#define MAX_CANDIDATES 60000u
+
+/* A pair that cannot tell this many times t_h from the ground does not judge. */
+#define MAX_BLIND_HEIGHT 5.0
+
+/* Areas that differ by more are not the same texture any more. */
+#define MAX_AREA_RATIO 9.0
+
+#define NO_MATCH UINT16_MAX
+
+/* ---- pairing junctions ---- */
+
+/* Where the partners of a left junction may be. */
+typedef struct pairing {
+    const oc_ground_view_t *left, *right;
+    const double *H, *H_inv;
+    const oc_pair_t *window; /* NULL: within radius_px of the transfer */
+    double radius_px;
+    double chi2;
+    float t_ncc;
+} pairing_t;
+
+typedef struct gate {
+    oc_window_t window;
+    bool has_window;
+    double to[2], radius2;
+    double chi2;
+} gate_t;
+
+static bool gate_open(const pairing_t *how, const double at[2], gate_t *gate)
+{
+    gate->has_window = how->window != NULL;
+    gate->chi2 = how->chi2;
+    gate->radius2 = how->radius_px * how->radius_px;
+    if (gate->has_window) return oc_window_ground(how->window, at[0], at[1], &gate->window) == OC_OK;
+    return oc_homography_apply(how->H, at[0], at[1], &gate->to[0], &gate->to[1]) > 0.0;
+}
+
+static bool gate_passes(const gate_t *gate, const double to[2])
+{
+    if (gate->has_window) return oc_window_d2(&gate->window, to[0], to[1]) < gate->chi2;
+    const double dx = to[0] - gate->to[0], dy = to[1] - gate->to[1];
+    return dx * dx + dy * dy < gate->radius2;
+}
+
+static void pair_score(oc_ground_ws_t *ws, uint32_t i, uint32_t j, float score)
+{
+    if (score > ws->ncc_right[i]) {
+        ws->ncc_right[i] = score;
+        ws->best_right[i] = (uint16_t)j;
+    }
+    if (score > ws->ncc_left[j]) {
+        ws->ncc_left[j] = score;
+        ws->best_left[j] = (uint16_t)i;
+    }
+}
+
+/* Partners of left junction i: the score of a pair is the worse of the two directions. */
+static uint32_t pair_one(oc_ground_ws_t *ws, const pairing_t *how, uint32_t n_px, uint32_t i)
+{
+    const oc_junction_t *a = &how->left->junctions[i];
+    const double at[2] = {(double)a->x_px, (double)a->y_px};
+    gate_t gate;
+    ground_patch_t patch, back_patch;
+    if (!gate_open(how, at, &gate)) return 0;
+    if (!oc_ground_patch_take(&how->left->grey, at[0], at[1], n_px, &patch)) return 0;
+
+    uint32_t n_candidates = 0;
+    for (uint32_t j = 0; j < how->right->n_junctions; j++) {
+        const oc_junction_t *b = &how->right->junctions[j];
+        const double to[2] = {(double)b->x_px, (double)b->y_px};
+        if (!gate_passes(&gate, to)) continue;
+        n_candidates++;
+        const float there = oc_ground_correlate(&patch, at, &how->right->grey, how->H, to);
+        if (there < how->t_ncc) continue;
+        if (!oc_ground_patch_take(&how->right->grey, to[0], to[1], n_px, &back_patch)) continue;
+        const float back = oc_ground_correlate(&back_patch, to, &how->left->grey, how->H_inv, at);
+        if (back < how->t_ncc) continue;
+        pair_score(ws, i, j, back < there ? back : there);
+    }
+    return n_candidates;
+}
+
+/* Matches that are best for both their junctions, best first. Returns the
+ * number of pairs looked at. */
+static uint32_t pair_up(oc_ground_ws_t *ws, const oc_ground_params_t *params, const pairing_t *how)
+{
+    for (uint32_t i = 0; i < OC_MAX_JUNCTIONS; i++) {
+        ws->best_left[i] = ws->best_right[i] = NO_MATCH;
+        ws->ncc_left[i] = ws->ncc_right[i] = 0.0f;
+    }
+    uint32_t n_candidates = 0;
+    for (uint32_t i = 0; i < how->left->n_junctions && n_candidates < MAX_CANDIDATES; i++) {
+        n_candidates += pair_one(ws, how, params->window_px, i);
+    }
+    ws->n_matches = 0;
+    for (uint32_t i = 0; i < how->left->n_junctions; i++) {
+        const uint16_t j = ws->best_right[i];
+        if (j == NO_MATCH || ws->best_left[j] != i) continue;
+        /* Insertion keeps them sorted; equal scores stay in order of i. */
+        uint32_t k = ws->n_matches++;
+        for (; k > 0 && ws->matches[k - 1].ncc < ws->ncc_right[i]; k--) ws->matches[k] = ws->matches[k - 1];
+        ws->matches[k] = (oc_ground_match_t){.left = (uint16_t)i, .right = j, .ncc = ws->ncc_right[i]};
+    }
+    return n_candidates;
+}
+
+/* ---- judging single junctions ---- */
+
+typedef enum verdict { VERDICT_NONE, VERDICT_GROUND, VERDICT_REFUTED } verdict_t;
+
+/* One direction of a refined pair. */
+typedef struct sight {
+    const oc_ground_view_t *from, *to;
+    const ground_pair_t *pair; /* from -> to */
+    const double *H, *H_inv;
+    bool is_reverse; /* pair's own left is `to` */
+} sight_t;
+
+/* Standard deviation of the expected place, pixels of `to`. */
+static double place_sigma_px(const sight_t *s, const ground_pair_t *forward, const double at[2], const double to[2],
+                             double area)
+{
+    if (!s->is_reverse) return oc_ground_transfer_sigma_px(forward, at[0], at[1]);
+    return oc_ground_transfer_sigma_px(forward, to[0], to[1]) * sqrt(area);
+}
+
+static bool agrees_back(const sight_t *s, const oc_ground_params_t *params, const double at[2],
+                        const ground_lookup_t *found)
+{
+    double to[2];
+    ground_patch_t patch;
+    if (oc_homography_apply(s->H, at[0] + (double)found->dx_px, at[1] + (double)found->dy_px, &to[0], &to[1]) == 0.0) {
+        return false;
+    }
+    if (!oc_ground_patch_take(&s->to->grey, to[0], to[1], params->window_px, &patch)) return false;
+    return oc_ground_correlate(&patch, to, &s->from->grey, s->H_inv, at) >= params->t_g_second;
+}
+
+/* The place where the patch was found, off_px from where the ground would be,
+ * means a height: near enough to 0, and known well enough to mean it? */
+static bool is_at_height_0(const sight_t *s, const oc_ground_params_t *params, const double at[2],
+                           const double off_px[2], double sigma_px)
+{
+    double rise_px[2]; /* for a height of t_h */
+    if (!(hypot(off_px[0], off_px[1]) <= (double)params->t_transfer_px)) return false;
+    if (oc_ground_rise(s->pair, at[0], at[1], params->t_h_m, rise_px) != OC_OK) return false;
+    const double rise2 = rise_px[0] * rise_px[0] + rise_px[1] * rise_px[1];
+    if (!(rise2 > 0.0)) return false;
+    const double height = (off_px[0] * rise_px[0] + off_px[1] * rise_px[1]) / rise2; /* in units of t_h */
+    const double doubt = 2.58 * hypot(sigma_px, params->sigma_px) / sqrt(rise2);
+    return doubt <= MAX_BLIND_HEIGHT && (fabs(height) <= 1.0 || fabs(height) <= doubt);
+}
+
+static verdict_t judge(const sight_t *s, const ground_pair_t *forward, const oc_ground_params_t *params,
+                       const oc_junction_t *junction, uint8_t *strength)
+{
+    const double at[2] = {(double)junction->x_px, (double)junction->y_px};
+    double to[2], J[4];
+    if (!(oc_homography_apply(s->H, at[0], at[1], &to[0], &to[1]) > 0.0)) return VERDICT_NONE;
+    if (oc_homography_jacobian(s->H, at[0], at[1], J) != OC_OK) return VERDICT_NONE;
+    const double area = J[0] * J[3] - J[1] * J[2];
+    if (!(area < MAX_AREA_RATIO && area > 1.0 / MAX_AREA_RATIO)) return VERDICT_NONE;
+    const double sigma_px = place_sigma_px(s, forward, at, to, area);
+    if (!(2.58 * sigma_px <= (double)params->t_transfer_px)) return VERDICT_NONE;
+
+    ground_patch_t patch;
+    ground_lookup_t found;
+    if (!oc_ground_patch_take(&s->from->grey, at[0], at[1], params->window_px, &patch)) return VERDICT_NONE;
+    oc_ground_look_up(&patch, at, &s->to->grey, s->H, &found);
+    if (!found.is_inside) return VERDICT_NONE;
+    if (found.ncc < params->t_refuted) {
+        const float lack = params->t_refuted - (found.ncc > 0.0f ? found.ncc : 0.0f);
+        *strength = (uint8_t)(128.0f + 127.0f * lack / (params->t_refuted + 1e-6f));
+        return VERDICT_REFUTED;
+    }
+    if (found.ncc < params->t_g_second) return VERDICT_NONE;
+
+    const double off_px[2] = {J[0] * (double)found.dx_px + J[1] * (double)found.dy_px,
+                              J[2] * (double)found.dx_px + J[3] * (double)found.dy_px};
+    if (!is_at_height_0(s, params, at, off_px, sigma_px)) return VERDICT_NONE;
+    if (!agrees_back(s, params, at, &found)) return VERDICT_NONE;
+    *strength = (uint8_t)(255.0f * (found.ncc < 1.0f ? found.ncc : 1.0f));
+    return VERDICT_GROUND;
+}
+
+static void vote(oc_ground_votes_t *votes, verdict_t verdict, uint8_t strength)
+{
+    if (verdict == VERDICT_GROUND) {
+        if (votes->n_ground < UINT8_MAX) votes->n_ground++;
+        if (strength > votes->best_ground) votes->best_ground = strength;
+    } else if (verdict == VERDICT_REFUTED) {
+        if (votes->n_refuted < UINT8_MAX) votes->n_refuted++;
+        if (strength > votes->best_refuted) votes->best_refuted = strength;
+    }
+}
+
+static void judge_all(const sight_t *s, const ground_pair_t *forward, const oc_ground_params_t *params,
+                      oc_ground_votes_t votes[], uint8_t is_ground[])
+{
+    for (uint32_t i = 0; i < s->from->n_junctions; i++) {
+        uint8_t strength = 0;
+        const verdict_t verdict = judge(s, forward, params, &s->from->junctions[i], &strength);
+        is_ground[i] = verdict == VERDICT_GROUND;
+        vote(&votes[i], verdict, strength);
+    }
+}
+
+/* ---- the pair ---- */
+
+static oc_status_t check_view(const oc_ground_view_t *v)
+{
+    if (v->n_junctions > OC_MAX_JUNCTIONS) return OC_E_LIMIT;
+    if (!oc_image_is_valid(&v->grey) || v->grey.channels != 1) return OC_E_ARG;
+    if (!oc_intrinsics_is_valid(&v->camera.k) || !oc_pose_is_valid(&v->camera.pose)) return OC_E_ARG;
+    if (v->camera.k.width_px != v->grey.width_px || v->camera.k.height_px != v->grey.height_px) return OC_E_ARG;
+    for (int i = 0; i < 6; i++) {
+        if (!(v->margin.v[i] >= 0.0 && v->margin.v[i] <= 1e6)) return OC_E_ARG;
+    }
+    return OC_OK;
+}
+
+/* First pass: junction pairs inside the windows that the margins allow. */
+static oc_status_t first_pass(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
+                              const oc_ground_view_t *reference, oc_ground_result_t *result)
+{
+    oc_pair_t prepared;
+    const oc_status_t status = oc_pair_prepare(&prepared, &view->camera, &view->margin, &reference->camera,
+                                               &reference->margin, OC_ANGLE_ERROR_LOCAL, params->sigma_px);
+    if (status != OC_OK) return status;
+    double H_inv[9];
+    if (oc_plane_ground_homography(&reference->camera, &view->camera, H_inv) != OC_OK) return OC_E_DEGENERATE;
+    const pairing_t how = {.left = view,
+                           .right = reference,
+                           .H = prepared.H,
+                           .H_inv = H_inv,
+                           .window = &prepared,
+                           .chi2 = params->window_chi2,
+                           .t_ncc = params->t_g};
+    result->n_candidates = pair_up(ws, params, &how);
+    result->n_matches = ws->n_matches;
+    return OC_OK;
+}
+
+/* Keep the final matches both of whose junctions were judged to be ground. */
+static void keep_ground_matches(oc_ground_ws_t *ws, const uint8_t view_ground[], const uint8_t ref_ground[])
+{
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < ws->n_matches; i++) {
+        const oc_ground_match_t m = ws->matches[i];
+        if (!ws->is_inlier[i] || !view_ground[m.left] || !ref_ground[m.right]) continue;
+        ws->matches[n++] = m;
+    }
+    ws->n_matches = n;
+}
+
+oc_status_t oc_ground_match_views(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
+                                  const oc_ground_view_t *reference, oc_ground_votes_t votes[],
+                                  oc_ground_votes_t ref_votes[], oc_ground_result_t *result)
+{
+    OC_ASSERT(ws && params && view && reference && votes && ref_votes && result);
+
+    if (!oc_ground_params_are_valid(params)) return OC_E_ARG;
+    oc_status_t status = check_view(view);
+    if (status == OC_OK) status = check_view(reference);
+    if (status != OC_OK) return status;
+
+    oc_ground_result_t found = {.is_refined = false};
+    ws->n_matches = 0;
+    status = first_pass(ws, params, view, reference, &found);
+    if (status != OC_OK) return status;
+    ground_pair_t pair;
+    oc_ground_refine(ws, params, view, reference, &pair, &found);
+    if (!found.is_refined) {
+        ws->n_matches = 0;
+        *result = found;
+        return OC_OK;
+    }
+
+    /* Second pass: the refined homography leaves a window of t_H only. */
+    const pairing_t narrow = {.left = view,
+                              .right = reference,
+                              .H = pair.H,
+                              .H_inv = pair.H_inv,
+                              .radius_px = (double)params->t_transfer_px,
+                              .t_ncc = params->t_g_second};
+    (void)pair_up(ws, params, &narrow);
+    if (!oc_ground_refit(ws, params, view, reference, &pair, &found)) ws->n_matches = 0;
+
+    ground_pair_t reverse = pair;
+    reverse.left = pair.right;
+    reverse.right = pair.left;
+    memcpy(reverse.H, pair.H_inv, sizeof reverse.H);
+    memcpy(reverse.H_inv, pair.H, sizeof reverse.H_inv);
+    const sight_t there = {.from = view, .to = reference, .pair = &pair, .H = pair.H, .H_inv = pair.H_inv};
+    const sight_t back = {
+        .from = reference, .to = view, .pair = &reverse, .H = pair.H_inv, .H_inv = pair.H, .is_reverse = true};
+    judge_all(&there, &pair, params, votes, ws->view_ground);
+    judge_all(&back, &pair, params, ref_votes, ws->ref_ground);
+    keep_ground_matches(ws, ws->view_ground, ws->ref_ground);
+    *result = found;
+    return OC_OK;
+}

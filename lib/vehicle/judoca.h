@@ -1,0 +1,149 @@
+/* SPDX-License-Identifier: BSD-3-Clause
+ * JUDOCA: junctions where straight edges meet, with their branch directions. */
+#ifndef OUTCROP_VEHICLE_JUDOCA_H
+#define OUTCROP_VEHICLE_JUDOCA_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/image.h"
+#include "core/junction.h"
+#include "core/status.h"
+#include "vehicle/arena.h"
+#include "vehicle/gradient.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Largest branch length; sizes the ray tables and the margin of the maps. */
+#define OC_JUDOCA_MAX_LAMBDA_PX 24
+
+/* Directions looked at from one pixel: the pixels of a circle of that radius. */
+#define OC_JUDOCA_MAX_RAYS 192u
+
+/* Places fitted per image at most; 4 bytes each. */
+#define OC_JUDOCA_MAX_CANDIDATES 262144u
+
+/* Fits kept per image before the nearest duplicates are dropped; 96 bytes each. */
+#define OC_JUDOCA_MAX_FOUND 8192u
+
+typedef enum oc_judoca_method {
+    OC_JUDOCA_REFINED = 0, /* branches fitted to sub-pixel edges, apex is their intersection */
+    OC_JUDOCA_THESIS = 1   /* thesis 3.3: integer apex, chord angles, strength only */
+} oc_judoca_method_t;
+
+/* Tunables. Start from oc_judoca_defaults() and change what you must. */
+typedef struct oc_judoca_params {
+    float sigma_px;      /* of the Gaussian before the derivative, 0.6..3; default 1.2 */
+    float t_b;           /* threshold of the thick map B, grey levels per px of the unit-gain
+                          * derivative, 0.5..100; 0 = from the image's own noise (t_b_noise_k) */
+    float t_b_noise_k;   /* t_b = k * sd of one derivative component, 1..20, used when t_b is 0;
+                          * the result is kept in [OC_JUDOCA_MIN_T_B, OC_JUDOCA_MAX_T_B] */
+    float s_j;           /* least share of B+ pixels along a branch (thesis s_J), 0.3..1 */
+    int32_t lambda_px;   /* longest branch, 6..OC_JUDOCA_MAX_LAMBDA_PX (thesis lambda) */
+    int32_t lambda_min_px; /* shortest branch, 4..lambda_px; equal to lambda_px = thesis */
+    float min_angle_rad; /* two branches closer than this are one, 0.1..1 */
+    float min_bend_rad;  /* a pair whose angle is nearer to pi than this is a line, 0.05..1 */
+    float max_rms_px;    /* an edge that leaves its straight line by more is no branch, 0.1..2 */
+    float max_apex_sigma_px; /* a less certain apex is dropped, 0.1..3 */
+    float min_distance_px;   /* of two nearer apices the better stays, 1..20 */
+    uint32_t max_junctions;  /* kept per image, 1..OC_MAX_JUNCTIONS */
+    uint32_t max_candidates; /* fitted per image, best pre-score first,
+                              * 16..OC_JUDOCA_MAX_CANDIDATES */
+    uint32_t spread_cell_px; /* when the limit binds, cells of this side share it, 8..4096 */
+    oc_judoca_method_t method;
+} oc_judoca_params_t;
+
+#define OC_JUDOCA_MIN_T_B 2.0f
+#define OC_JUDOCA_MAX_T_B 20.0f
+
+/* What one call of oc_judoca_detect met; counts of pixels, places, junctions. */
+typedef struct oc_judoca_stats {
+    float t_b;              /* threshold in force */
+    uint32_t n_thin;        /* pixels of B+ */
+    uint32_t n_places;      /* places that looked like a junction */
+    uint32_t n_fitted;      /* of these, within max_candidates */
+    uint32_t n_found;       /* junctions before max_junctions and cap */
+    uint32_t n_dropped;     /* junctions lost to max_junctions or cap */
+} oc_judoca_stats_t;
+
+/* One ray: from the centre to a pixel of the circle. */
+typedef struct oc_judoca_ray {
+    uint8_t n;         /* samples, from the circle inwards */
+    uint8_t n_needed;  /* of these on B+ for strength s_j */
+    uint16_t bit;      /* of the oriented map: gradient on the left of the ray */
+    uint16_t bit_back; /* the same edge with the opposite gradient */
+    float ux, uy;      /* unit vector */
+    float angle_rad;
+    int32_t offset[OC_JUDOCA_MAX_LAMBDA_PX]; /* into a padded map */
+} oc_judoca_ray_t;
+
+/* A junction waiting for its place in the answer. */
+typedef struct oc_judoca_rank {
+    float key;      /* larger first */
+    uint32_t index; /* into found; the smaller wins a tie */
+} oc_judoca_rank_t;
+
+/* Tables and maps for one image size. In the header only so that callers can
+ * place it; read `stats` and `gradient` after a call, nothing else. */
+typedef struct oc_judoca_ws {
+    oc_judoca_params_t params;
+    oc_judoca_stats_t stats;
+    oc_gradient_t gradient; /* of the last image */
+    float cos_min_angle;
+    uint32_t n_rays;
+    oc_judoca_ray_t *ray;
+    int32_t map_border;     /* zeros around the padded maps, px */
+    int32_t map_pitch;      /* elements per row of the padded maps */
+    uint32_t *oriented;     /* one bit per gradient direction: low half B+ grown across the
+                             * edge, high half B+ itself */
+    uint16_t *prescore;     /* strength of the place in 1/65535, 0 = no junction */
+    uint32_t *place;        /* [max_candidates] index into prescore of a place to fit */
+    oc_junction_t *found;   /* [OC_JUDOCA_MAX_FOUND] */
+    oc_judoca_rank_t *rank; /* [OC_JUDOCA_MAX_FOUND] */
+    uint16_t *cell;         /* junctions met per spread cell */
+} oc_judoca_ws_t;
+
+/* Defaults tuned for repeatability across views 20 to 40 degrees apart. */
+oc_judoca_params_t oc_judoca_defaults(void);
+
+/* Every field in its range. */
+bool oc_judoca_params_are_valid(const oc_judoca_params_t *params);
+
+/* Bytes to give to oc_judoca_init, padding included; 0 when the sides are not
+ * within OC_MIN_IMAGE_SIDE..OC_MAX_IMAGE_SIDE or params are not valid. */
+size_t oc_judoca_size_bytes(uint32_t width_px, uint32_t height_px,
+                            const oc_judoca_params_t *params);
+
+/* Take maps for images of exactly this size from the arena and build the ray
+ * tables. params are copied.
+ *
+ * OC_E_ARG for a bad size or params, OC_E_SPACE when the arena is too small;
+ * ws is then not usable. */
+OC_CHECKED oc_status_t oc_judoca_init(oc_judoca_ws_t *ws, oc_arena_t *arena, uint32_t width_px,
+                                      uint32_t height_px, const oc_judoca_params_t *params);
+
+/* Find the junctions of a grey image (thesis 3.3; what is added is in
+ * docs/design.md: growing branches, line fits, sub-pixel apex).
+ *
+ * ws     made for the image's size; one per thread
+ * grey   one channel, any stride
+ * out    [cap], best score first: apex in px, branches sorted by angle, kind
+ *        set, label OC_LABEL_UNKNOWN, confidence 0
+ * count  out, 0..min(cap, params.max_junctions)
+ *
+ * OC_E_ARG for an image that is not valid, not grey or not of the size given
+ * to init; nothing is written then. An image without junctions is OC_OK with
+ * count 0. The same image gives the same answer, bit for bit, whatever its
+ * stride and whatever was detected before.
+ *
+ * O(width * height * rays) in the worst case, about 5 % of it on photographs. */
+OC_CHECKED oc_status_t oc_judoca_detect(oc_judoca_ws_t *ws, const oc_image_t *grey,
+                                        oc_junction_t out[], uint32_t cap, uint32_t *count);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

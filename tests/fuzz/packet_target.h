@@ -1,0 +1,11 @@
+/* SPDX-License-Identifier: BSD-3-Clause
+ * The entry point that libFuzzer and the replay share. */
+#ifndef OUTCROP_TESTS_PACKET_TARGET_H
+#define OUTCROP_TESTS_PACKET_TARGET_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+#endif

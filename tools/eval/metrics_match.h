@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: BSD-3-Clause
+ * Are the matches, and the labels `ground`, true? */
+#ifndef OUTCROP_EVAL_METRICS_MATCH_H
+#define OUTCROP_EVAL_METRICS_MATCH_H
+
+#include "run.h"
+#include "truth.h"
+
+#include <optional>
+
+namespace outcrop::eval {
+
+/* Nothing where a share has no base (n = 0) or is not defined. */
+struct ShareMetric {
+    int n = 0, correct = 0;
+    std::optional<double> precision, recall;
+};
+
+/* Some true depth in the 3x3 pixels round the left apex puts it within 3 px of
+ * the right apex and visible there (true right depth within 1 % in 3x3).
+ * Nothing when either view has no true depth. */
+std::optional<bool> is_correct(const FoundMatch &match, const Truth &truth);
+
+/* The pixel and all mask pixels within 2 px of it are ground or litter and the
+ * pixel itself is one of the two. */
+bool is_true_ground(const DepthMap &map, const Eigen::Vector2d &pixel);
+
+/* Obstacle matches. */
+std::optional<ShareMetric> evaluate_matches(const Truth &truth, const Run &run, Notes &notes);
+
+/* From vehicle/junctions.json: n are the junctions labelled ground, correct
+ * those that are true ground, recall the share of true ground junctions,
+ * co-visible with a stored reference view, that are labelled ground. A
+ * junction is co-visible when a junction of its own reference view or of a view listed before its own lies
+ * within 2 px of its true transfer. Without that file from the ground matches:
+ * correct when the left apex is true ground and the match itself correct; no
+ * recall. */
+std::optional<ShareMetric> evaluate_ground(const Truth &truth, const Run &run, Notes &notes);
+
+} // namespace outcrop::eval
+#endif

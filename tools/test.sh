@@ -1,0 +1,22 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Set-up, build and tests; the last line counts test cases: test.sh [release|debug-asan] [LABEL]
+# LABEL (unit or site) builds and runs only that kind.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+export PATH=/usr/bin:/bin:$PATH # Debian's ctest
+preset=${1:-release}
+label=${2-}
+build=build
+[ "$preset" = release ] || build=build-asan
+tools/build.sh "$preset" ${label:+"tests_$label"}
+
+results=$PWD/$build/test_results.xml
+rm -f "$results"
+status=0
+ctest --preset "$preset" -j "$(nproc)" --no-tests=error ${label:+-L "^$label\$"} --output-junit "$results" \
+    --test-output-size-passed 1000000 --test-output-size-failed 1000000 || status=$?
+[ -e "$results" ] || { echo "test: ctest wrote no results" >&2; exit 1; }
+/usr/bin/python3 tools/checks/count_tests.py "$results" || status=1
+exit "$status"
