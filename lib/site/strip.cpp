@@ -10,6 +10,7 @@ namespace outcrop {
 namespace {
 
 constexpr int kBucketPx = 16;
+constexpr double kThesisLinePx = 3;     // t_F of the thesis' section 5.9, where margins leave no strip
 constexpr double kNoHeightLimit = 1e4;  // metres
 
 struct Rect {
@@ -68,7 +69,7 @@ public:
         : pair_(pair), options_(options), width_px_(right.camera.k.width_px), height_px_(right.camera.k.height_px)
     {
         reach_.z_min_m = -options.below_ground_m;
-        reach_.z_max_m = std::max(area.z_max, reach_.z_min_m);
+        reach_.z_max_m = std::max(area.z_max, reach_.z_min_m + 1e-6);
         reach_.depth_min_m = 1e-3;
         reach_.depth_max_m = 1e6;
         rival_reach_ = reach_;
@@ -101,7 +102,9 @@ public:
 
     bool contains(double x_px, double y_px) const
     {
-        if (options_.method == StripMethod::kThesis) return oc_strip_contains_thesis(&thesis_strip_, x_px, y_px);
+        if (options_.method == StripMethod::kThesis) {
+            return oc_strip_contains_thesis(&thesis_strip_, x_px, y_px) || std::abs(distance_px(x_px, y_px)) < kThesisLinePx;
+        }
         if (!oc_strip_contains(&strip_, x_px, y_px)) return false;
         if (options_.max_half_width_px > 0 && std::abs(distance_px(x_px, y_px)) > options_.max_half_width_px) {
             return false;

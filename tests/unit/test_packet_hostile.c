@@ -119,10 +119,11 @@ static void trailing_bytes_and_padding_bits_are_refused(void)
         repair_crc(bytes, n + 1u);
         TEST_ASSERT_EQUAL_MESSAGE(OC_E_FORMAT, decode_watched(type, bytes, n + 1u), packets[i].name);
     }
-    /* Status ends with one bit and seven of padding. */
+    /* Status with an area ends with two bits and six of padding. */
     memcpy(bytes, packets[8].bytes, packets[8].n_bytes);
-    for (unsigned bit = 0; bit < 7; bit++) {
-        bytes[packets[8].n_bytes - 3u] = (uint8_t)(0x80u | 1u << bit);
+    const uint8_t last = packets[8].bytes[packets[8].n_bytes - 3u];
+    for (unsigned bit = 0; bit < 6; bit++) {
+        bytes[packets[8].n_bytes - 3u] = (uint8_t)(last | 1u << bit);
         repair_crc(bytes, packets[8].n_bytes);
         TEST_ASSERT_EQUAL(OC_E_FORMAT, decode_watched(OC_PACKET_STATUS, bytes, packets[8].n_bytes));
     }
