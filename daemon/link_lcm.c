@@ -2,12 +2,20 @@
  * The narrow link over LCM. */
 #include "link_lcm.h"
 
+#include <arpa/inet.h>
+#include <errno.h>
 #include <lcm/lcm.h>
+#include <netinet/in.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include "outcrop_packet_t.h"
+
+/* liblcm's own default. */
+#define LCM_DEFAULT_GROUP "239.255.76.67"
 
 struct oc_link {
     lcm_t *send;
@@ -65,15 +73,31 @@ static void link_on_message(const lcm_recv_buf_t *buf, const char *channel, void
     link->on_packet(link->user, packet, n_bytes);
 }
 
+bool oc_link_has_route(const char *url, char *error, size_t error_bytes)
+{
+    if (strncmp(url, "udpm://", 7) != 0) return true;
+    char host[16] = LCM_DEFAULT_GROUP;
+    unsigned port = 7667;
+    if (url[7] != '\0' && url[7] != '?' && sscanf(url + 7, "%15[0-9.]:%u", host, &port) < 1) host[0] = '\0';
+    struct sockaddr_in group = {.sin_family = AF_INET, .sin_port = htons((uint16_t)port)};
+    if (inet_pton(AF_INET, host, &group.sin_addr) != 1 || port == 0 || port > UINT16_MAX) {
+        snprintf(error, error_bytes, "%s: must be udpm://GROUP:PORT?ttl=N with an IPv4 multicast group", url);
+        return false;
+    }
+    const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    const bool is_ok = fd >= 0 && connect(fd, (const struct sockaddr *)&group, sizeof group) == 0;
+    if (!is_ok)
+        snprintf(error, error_bytes, "%s: %s: is there a multicast route (ip route add 239.0.0.0/8 dev IFACE)?", url,
+                 strerror(errno));
+    if (fd >= 0) close(fd);
+    return is_ok;
+}
+
 static lcm_t *link_create(const char *url, char *error, size_t error_bytes)
 {
+    if (!oc_link_has_route(url, error, error_bytes)) return NULL;
     lcm_t *lcm = lcm_create(url);
-    if (!lcm) {
-        snprintf(error, error_bytes,
-                 "cannot open %s: is the URL right, and is there a multicast route "
-                 "(ip route add 239.0.0.0/8 dev IFACE)?",
-                 url);
-    }
+    if (!lcm) snprintf(error, error_bytes, "cannot open %s: is the URL right?", url);
     return lcm;
 }
 
@@ -124,8 +148,9 @@ int oc_link_handle(oc_link_t *link, int timeout_ms)
 {
     int handled = 0;
     for (;;) {
+        errno = 0;
         const int n = lcm_handle_timeout(link->receive, handled == 0 ? timeout_ms : 0);
-        if (n < 0) return -1;
+        if (n < 0) return errno == EINTR ? handled : -1; /* a signal is no fault of the transport */
         if (n == 0) return handled;
         handled++;
     }

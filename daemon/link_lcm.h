@@ -41,6 +41,10 @@ typedef struct oc_link_counts {
 /* Called once per well-framed packet; bytes are valid during the call only. */
 typedef void (*oc_link_receive_t)(void *user, const uint8_t *packet, size_t n_bytes);
 
+/* Whether a udpm:// URL's group can be reached from here; other URLs always
+ * can. liblcm would print a page about it; here it is one line in error. */
+bool oc_link_has_route(const char *url, char *error, size_t error_bytes);
+
 /* Open both directions. send_url carries send_channel, receive_url is where
  * receive_channel is heard; the same URL serves both when it is "memq://". On
  * failure NULL, and one line in error. */

@@ -4,18 +4,17 @@
 
 #include <cyaml/cyaml.h>
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
+#include "config_yaml.h"
 #include "core/packet.h"
 
 typedef struct yaml_file {
     uint32_t *vehicle, *datagram_bytes, *patch_quality;
-    char *down_url, *up_url, *lan_url, *out, *represent, *path, *method;
+    char *down_url, *up_url, *lan_url, *out, *represent, *path, *method, *exit_when_settled;
     double *area;
     uint32_t area_count;
-    bool *exit_when_settled;
 } yaml_file_t;
 
 #define OPTIONAL_POINTER (CYAML_FLAG_OPTIONAL | CYAML_FLAG_POINTER)
@@ -35,23 +34,11 @@ static const cyaml_schema_field_t fields[] = {
     CYAML_FIELD_STRING_PTR("path", OPTIONAL_POINTER, yaml_file_t, path, 1, MAX_TEXT),
     CYAML_FIELD_STRING_PTR("method", OPTIONAL_POINTER, yaml_file_t, method, 1, 15),
     CYAML_FIELD_SEQUENCE("area", OPTIONAL_POINTER, yaml_file_t, area, &number_schema, 5, 5),
-    CYAML_FIELD_BOOL_PTR("exit_when_settled", OPTIONAL_POINTER, yaml_file_t, exit_when_settled),
+    /* libcyaml takes every word but "false" and the like for true. */
+    CYAML_FIELD_STRING_PTR("exit_when_settled", OPTIONAL_POINTER, yaml_file_t, exit_when_settled, 1, 15),
     CYAML_FIELD_END};
 
 static const cyaml_schema_value_t schema = {CYAML_VALUE_MAPPING(CYAML_FLAG_POINTER, yaml_file_t, fields)};
-
-typedef struct yaml_log {
-    char text[200];
-} yaml_log_t;
-
-__attribute__((format(printf, 3, 0))) static void yaml_on_log(cyaml_log_t level, void *context, const char *format,
-                                                              va_list args)
-{
-    yaml_log_t *log = context;
-    if (level < CYAML_LOG_ERROR || log->text[0]) return;
-    vsnprintf(log->text, sizeof log->text, format, args);
-    log->text[strcspn(log->text, "\n")] = '\0';
-}
 
 static bool pick(const char *file, const char *key, const uint32_t *value, uint32_t low, uint32_t high, uint32_t *out,
                  char *error, size_t error_bytes)
@@ -96,7 +83,7 @@ static bool take_file(const char *file, const yaml_file_t *yaml, oc_base_config_
 {
     uint32_t vehicle = 0;
     config->datagram_bytes = OC_MAX_DATAGRAM_BYTES;
-    config->patch_quality = 16;
+    config->patch_quality = 8;
     if (!pick(file, "vehicle", yaml->vehicle, 0, 255, &vehicle, error, error_bytes)) return false;
     if (!pick(file, "datagram_bytes", yaml->datagram_bytes, OC_MIN_DATAGRAM_BYTES, OC_MAX_DATAGRAM_BYTES,
               &config->datagram_bytes, error, error_bytes))
@@ -109,30 +96,27 @@ static bool take_file(const char *file, const yaml_file_t *yaml, oc_base_config_
     if (!pick_word(file, "method", yaml->method, "best", "thesis", config->method, sizeof config->method, error,
                    error_bytes))
         return false;
+    char exit_when_settled[16];
+    if (!pick_word(file, "exit_when_settled", yaml->exit_when_settled, "false", "true", exit_when_settled,
+                   sizeof exit_when_settled, error, error_bytes))
+        return false;
     config->vehicle = yaml->vehicle ? (int)vehicle : -1;
     snprintf(config->down_url, sizeof config->down_url, "%s", yaml->down_url);
     snprintf(config->up_url, sizeof config->up_url, "%s", yaml->up_url);
     snprintf(config->lan_url, sizeof config->lan_url, "%s", yaml->lan_url ? yaml->lan_url : "");
     snprintf(config->out, sizeof config->out, "%s", yaml->out);
     snprintf(config->path, sizeof config->path, "%s", yaml->path ? yaml->path : "");
-    config->exit_when_settled = yaml->exit_when_settled && *yaml->exit_when_settled;
+    config->exit_when_settled = strcmp(exit_when_settled, "true") == 0;
     return take_area(file, yaml, config, error, error_bytes);
 }
 
 bool oc_base_config_load(const char *path, oc_base_config_t *config, char *error, size_t error_bytes)
 {
-    yaml_log_t log = {""};
-    const cyaml_config_t cyaml = {
-        .log_fn = yaml_on_log, .log_ctx = &log, .log_level = CYAML_LOG_ERROR, .mem_fn = cyaml_mem};
-    yaml_file_t *yaml = NULL;
-    const cyaml_err_t fault = cyaml_load_file(path, &cyaml, &schema, (cyaml_data_t **)&yaml, NULL);
-    if (fault != CYAML_OK) {
-        snprintf(error, error_bytes, "%s: %s", path, log.text[0] ? log.text : cyaml_strerror(fault));
-        return false;
-    }
+    void *data = NULL;
+    if (!oc_yaml_load(path, &schema, &data, error, error_bytes)) return false;
     oc_base_config_t fresh = {.vehicle = -1};
-    const bool is_ok = take_file(path, yaml, &fresh, error, error_bytes);
-    cyaml_free(&cyaml, &schema, yaml, 0);
+    const bool is_ok = take_file(path, data, &fresh, error, error_bytes);
+    oc_yaml_free(&schema, data);
     if (is_ok) *config = fresh;
     return is_ok;
 }

@@ -3,9 +3,11 @@
 #include "republish.h"
 
 #include <stdexcept>
+#include <utility>
 
 #include <lcm/lcm-cpp.hpp>
 
+#include "link_lcm.h"
 #include "outcrop/view_t.hpp"
 
 namespace outcrop {
@@ -50,15 +52,15 @@ view_t readable(int vehicle, const View &view)
 
 } // namespace
 
-struct Republisher::Lcm {
-    explicit Lcm(const std::string &url) : lcm(url) {}
-    lcm::LCM lcm;
-};
-
-Republisher::Republisher(const std::string &url) : lcm_(std::make_unique<Lcm>(url))
+Republisher::Republisher(const std::string &url)
 {
-    if (!lcm_->lcm.good()) throw std::runtime_error("cannot open " + url + ": is there a multicast route?");
+    char error[512];
+    if (!oc_link_has_route(url.c_str(), error, sizeof error)) throw std::runtime_error(error);
+    lcm_ = std::make_shared<lcm::LCM>(url);
+    if (!lcm_->good()) throw std::runtime_error("cannot open " + url + ": is the URL right?");
 }
+
+Republisher::Republisher(std::shared_ptr<lcm::LCM> lcm) : lcm_(std::move(lcm)) {}
 
 Republisher::~Republisher() = default;
 
@@ -66,7 +68,7 @@ void Republisher::publish(int vehicle, const View &view)
 {
     if (!published_.insert(view.id).second) return;
     const view_t message = readable(vehicle, view);
-    lcm_->lcm.publish("OUTCROP_VIEW", &message);
+    lcm_->publish("OUTCROP_VIEW", &message);
 }
 
 } // namespace outcrop

@@ -61,6 +61,7 @@ private:
     void record(const char *channel, const std::uint8_t *packet, std::size_t n_bytes);
     void tell_news();
     void write();
+    void write_on_leaving();
 
     oc_base_config_t config_;
     OutputOptions output_;
@@ -79,9 +80,7 @@ Live::Live(const oc_base_config_t &config) : config_(config)
     output_.represent = config.represent;
     output_.path = config.path;
     output_.method = config.method;
-    std::filesystem::create_directories(output_.dir);
-    std::filesystem::remove(output_.dir + "/report.json"); // the sign of a finished run
-    log_ = std::make_unique<LogWriter>(output_.dir + "/link.lcm");
+    check_output(output_);
     if (config.lan_url[0]) republisher_ = std::make_unique<Republisher>(config.lan_url);
 
     SessionOptions options = session_options(config.method);
@@ -97,6 +96,10 @@ Live::Live(const oc_base_config_t &config) : config_(config)
     link_.reset(oc_link_open(config.up_url, OC_CHANNEL_UP, config.down_url, OC_CHANNEL_DOWN, on_packet, this, error,
                              sizeof error));
     if (!link_) throw std::runtime_error(error);
+    // Last, so that a start that failed leaves nothing behind.
+    std::filesystem::create_directories(output_.dir);
+    std::filesystem::remove(output_.dir + "/report.json"); // the sign of a finished run
+    log_ = std::make_unique<LogWriter>(output_.dir + "/link.lcm");
 }
 
 void Live::record(const char *channel, const std::uint8_t *packet, std::size_t n_bytes)
@@ -132,12 +135,14 @@ void Live::tell_news()
     n_told_ = views.size();
     say(std::to_string(n_told_) + " views, " + std::to_string(ledger_.total().bytes) + " bytes so far");
     if (!republisher_) return;
-    for (const auto &[id, view] : views) republisher_->publish(config_.vehicle, view);
+    for (const auto &[id, view] : views) republisher_->publish(session_->vehicle(), view);
 }
 
 void Live::write()
 {
-    write_output(*session_, ledger_, counts_, output_, say);
+    ReceiveCounts counts = counts_;
+    counts.ill_formed += oc_link_get_counts(link_.get()).ill_formed;
+    write_output(*session_, ledger_, counts, output_, say);
     say("settled: " + std::to_string(ledger_.total().bytes) + " bytes on the link, " + output_.dir + " written");
 }
 
@@ -146,18 +151,30 @@ void Live::run()
     say("ready");
     bool is_written = false;
     while (!g_is_stopped) {
-        if (oc_link_handle(link_.get(), kStepMs) < 0) throw std::runtime_error("the link failed");
+        if (oc_link_handle(link_.get(), kStepMs) < 0 && !g_is_stopped) throw std::runtime_error("the link failed");
         session_->step(now_s());
         tell_news();
         if (!session_->is_settled()) {
             is_written = false;
         } else if (!is_written) {
-            counts_.ill_formed += oc_link_get_counts(link_.get()).ill_formed;
             write();
             is_written = true;
             if (config_.exit_when_settled) return;
         }
     }
+    if (!is_written) write_on_leaving();
+}
+
+// A signal before all has come: what there is is still worth having.
+void Live::write_on_leaving()
+{
+    session_->settle();
+    if (session_->views().empty()) {
+        say("ended before any view was complete, nothing written");
+        return;
+    }
+    say("ended before all had come, writing what there is");
+    write();
 }
 
 } // namespace

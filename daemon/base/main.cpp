@@ -20,12 +20,18 @@ void say(const std::string &text)
     std::fflush(stdout);
 }
 
-int live(const std::string &file)
+int live(const std::string &file, bool is_check)
 {
     oc_base_config_t config;
     char error[1024];
     if (!oc_base_config_load(file.c_str(), &config, error, sizeof error)) throw std::runtime_error(error);
-    outcrop::run_live(config);
+    if (is_check) {
+        outcrop::OutputOptions output;
+        output.path = config.path;
+        outcrop::check_output(output);
+    } else {
+        outcrop::run_live(config);
+    }
     return 0;
 }
 
@@ -52,6 +58,8 @@ int main(int argc, char **argv)
     std::string config;
     CLI::App *live_command = app.add_subcommand("live", "listen to a vehicle, write the run's folder when settled");
     live_command->add_option("--config", config, "YAML file; keys in docs/operating.md")->required();
+    bool is_check = false;
+    live_command->add_flag("--check", is_check, "check the configuration, then exit");
 
     outcrop::ReplayOptions options;
     std::vector<double> area;
@@ -77,7 +85,7 @@ int main(int argc, char **argv)
     }
     cv::setNumThreads(1); // sums in one order, whatever the machine
     try {
-        return *live_command ? live(config) : replay(options, area);
+        return *live_command ? live(config, is_check) : replay(options, area);
     } catch (const std::exception &fault) {
         std::fprintf(stderr, "outcrop-base: %s\n", fault.what());
         return 1;

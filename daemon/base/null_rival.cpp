@@ -7,6 +7,7 @@
 #include <cstring>
 #include <new>
 #include <stdexcept>
+#include <tuple>
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -14,9 +15,8 @@
 namespace outcrop {
 namespace {
 
-// No keyframe within the image limits compresses to more than its pixels.
-constexpr std::uint32_t kMaxImageBytes = 64u << 20;
-constexpr std::size_t kMaxKeyframes = 4096;
+constexpr std::size_t kMaxKeyframes = 4096; // of at most 256 datagrams each
+constexpr int kMaskParts = 32;
 
 struct RectifyDelete {
     void operator()(oc_rectify_t *rectify) const { oc_rectify_destroy(rectify); }
@@ -37,36 +37,43 @@ struct Free {
 NullRival::NullRival() = default;
 NullRival::~NullRival() = default;
 
-bool NullRival::take(const oc_image_piece_t &piece)
+FeedResult NullRival::take(const oc_image_piece_t &piece)
 {
-    if (piece.total_bytes == 0 || piece.total_bytes > kMaxImageBytes) return false;
-    if (keyframes_.size() >= kMaxKeyframes && keyframes_.count(piece.head.view) == 0) return false;
+    const auto known = keyframes_.find(piece.head.view);
+    if (known == keyframes_.end() && keyframes_.size() >= kMaxKeyframes) return FeedResult::kFull;
     Keyframe &keyframe = keyframes_[piece.head.view];
-    if (!keyframe.rgb.empty()) return false;
-    if (keyframe.total_bytes != piece.total_bytes) keyframe = Keyframe{};
-    keyframe.head = piece.head;
+    if (piece.head.utime_us < keyframe.head.utime_us) return FeedResult::kKnown;
+    const bool is_other = piece.head.utime_us != keyframe.head.utime_us || piece.total_bytes != keyframe.total_bytes;
+    if (!is_other && !keyframe.rgb.empty()) return FeedResult::kKnown;
+    if (is_other) keyframe = Keyframe{};
+    Piece fresh{piece.offset_bytes, {piece.bytes, piece.bytes + piece.n_bytes}};
+    const auto [place, is_new] = keyframe.parts.try_emplace(piece.head.part, fresh);
+    Piece &old = place->second;
+    if (!is_new && std::tie(old.offset_bytes, old.bytes) <= std::tie(fresh.offset_bytes, fresh.bytes))
+        return FeedResult::kKnown;
+    old = std::move(fresh);
+    if (keyframe.parts.size() == 1 || piece.head.part == 0) keyframe.head = piece.head;
     keyframe.codec = piece.codec;
     keyframe.total_bytes = piece.total_bytes;
-    keyframe.pieces[piece.offset_bytes].assign(piece.bytes, piece.bytes + piece.n_bytes);
-    keyframe.parts[piece.head.part] = piece.offset_bytes;
-    keyframe.has_last = keyframe.has_last || piece.head.is_last;
-    return decode(&keyframe);
+    decode(&keyframe);
+    return FeedResult::kTaken;
 }
 
-bool NullRival::decode(Keyframe *keyframe)
+// Sets rgb when all pieces are there and make a picture.
+void NullRival::decode(Keyframe *keyframe)
 {
     std::vector<std::uint8_t> bytes;
-    for (const auto &[offset, piece] : keyframe->pieces) {
-        if (offset != bytes.size()) return false;
-        bytes.insert(bytes.end(), piece.begin(), piece.end());
+    int expected = 0;
+    for (const auto &[part, piece] : keyframe->parts) {
+        if (part != expected++ || piece.offset_bytes != bytes.size()) return;
+        bytes.insert(bytes.end(), piece.bytes.begin(), piece.bytes.end());
     }
-    if (bytes.size() != keyframe->total_bytes) return false;
+    if (bytes.size() != keyframe->total_bytes) return;
     cv::Mat bgr = cv::imdecode(bytes, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
     const oc_intrinsics_t &k = keyframe->head.camera.k;
-    if (bgr.empty() || bgr.cols != static_cast<int>(k.width_px) || bgr.rows != static_cast<int>(k.height_px))
-        return false;
+    if (bgr.empty() || bgr.cols != static_cast<int>(k.width_px) || bgr.rows != static_cast<int>(k.height_px)) return;
     cv::cvtColor(bgr, keyframe->rgb, cv::COLOR_BGR2RGB);
-    if (!keyframe->head.has_distortion) return true;
+    if (!keyframe->head.has_distortion) return;
     const std::unique_ptr<oc_rectify_t, RectifyDelete> rectify(oc_rectify_create(k.width_px, k.height_px));
     if (!rectify) throw std::bad_alloc();
     const oc_image_t raw = image_of(keyframe->rgb);
@@ -74,7 +81,29 @@ bool NullRival::decode(Keyframe *keyframe)
     cv::Mat3b copy(bgr.rows, bgr.cols);
     std::memcpy(copy.data, flat.px, copy.total() * 3);
     keyframe->rgb = copy;
-    return true;
+}
+
+void NullRival::push(oc_vehicle_t *vehicle, int id, const Keyframe &keyframe, PacketAssembler *assembler) const
+{
+    oc_frame_t frame{};
+    frame.image = image_of(keyframe.rgb);
+    frame.camera = keyframe.head.camera;
+    frame.margin = keyframe.head.margin;
+    frame.has_distortion = keyframe.head.has_distortion;
+    frame.distortion = keyframe.head.distortion;
+    frame.utime_us = keyframe.head.utime_us;
+    frame.camera_index = keyframe.head.camera_index;
+    frame.has_view_id = true;
+    frame.view_id = static_cast<std::uint16_t>(id);
+    frame.is_forced = true;
+    oc_push_report_t report;
+    if (oc_vehicle_push(vehicle, &frame, &report) != OC_OK) return;
+    for (;;) {
+        std::uint8_t packet[OC_MAX_DATAGRAM_BYTES];
+        std::size_t packet_bytes = 0;
+        if (oc_vehicle_next(vehicle, packet, sizeof packet, &packet_bytes) != OC_OK || packet_bytes == 0) return;
+        assembler->feed(packet, packet_bytes);
+    }
 }
 
 std::map<int, View> NullRival::make_views(const std::optional<Area> &area)
@@ -96,26 +125,7 @@ std::map<int, View> NullRival::make_views(const std::optional<Area> &area)
 
     PacketAssembler assembler;
     for (const auto &[id, keyframe] : keyframes_) {
-        if (keyframe.rgb.empty()) continue;
-        oc_frame_t frame{};
-        frame.image = image_of(keyframe.rgb);
-        frame.camera = keyframe.head.camera;
-        frame.margin = keyframe.head.margin;
-        frame.has_distortion = keyframe.head.has_distortion;
-        frame.distortion = keyframe.head.distortion;
-        frame.utime_us = keyframe.head.utime_us;
-        frame.camera_index = keyframe.head.camera_index;
-        frame.has_view_id = true;
-        frame.view_id = static_cast<std::uint16_t>(id);
-        frame.is_forced = true;
-        oc_push_report_t report;
-        if (oc_vehicle_push(vehicle, &frame, &report) != OC_OK) continue;
-        for (;;) {
-            std::uint8_t packet[OC_MAX_DATAGRAM_BYTES];
-            std::size_t packet_bytes = 0;
-            if (oc_vehicle_next(vehicle, packet, sizeof packet, &packet_bytes) != OC_OK || packet_bytes == 0) break;
-            assembler.feed(packet, packet_bytes);
-        }
+        if (!keyframe.rgb.empty()) push(vehicle, id, keyframe, &assembler);
     }
     std::map<int, View> views = assembler.views();
     for (auto &[id, view] : views) {
@@ -125,23 +135,35 @@ std::map<int, View> NullRival::make_views(const std::optional<Area> &area)
     return views;
 }
 
-std::map<int, std::uint32_t> NullRival::missing(const std::optional<oc_vehicle_status_t> &status) const
+// All pieces but the last are of one size, so any of them says how many there are.
+std::uint32_t NullRival::missing_parts(const Keyframe &keyframe)
+{
+    int n_parts = 0;
+    for (const auto &[part, piece] : keyframe.parts) {
+        const std::size_t end = piece.offset_bytes + piece.bytes.size();
+        if (end < keyframe.total_bytes || part == 0)
+            n_parts = static_cast<int>((keyframe.total_bytes + piece.bytes.size() - 1) / piece.bytes.size());
+    }
+    std::uint32_t mask = 0;
+    for (int part = 0; part < n_parts; part++) {
+        if (keyframe.parts.count(part)) continue;
+        if (part >= kMaskParts) return UINT32_MAX;
+        mask |= 1u << part;
+    }
+    return mask ? mask : UINT32_MAX; // only the last came, or what came contradicts itself
+}
+
+std::map<int, std::uint32_t> NullRival::missing(const std::optional<oc_vehicle_status_t> &status,
+                                                const std::map<int, std::int64_t> &announced) const
 {
     std::map<int, std::uint32_t> out;
-    int newest = -1;
     for (const auto &[id, keyframe] : keyframes_) {
-        newest = std::max(newest, id);
-        if (!keyframe.rgb.empty()) continue;
-        std::uint32_t parts = 0;
-        const int greatest = keyframe.parts.empty() ? -1 : keyframe.parts.rbegin()->first;
-        for (int part = 0; part < greatest && part < 32; part++) {
-            if (keyframe.parts.count(part) == 0) parts |= 1u << part;
-        }
-        const bool is_all = parts == 0 || !keyframe.has_last || greatest >= 32;
-        out[id] = is_all ? UINT32_MAX : parts;
+        if (keyframe.rgb.empty()) out[id] = missing_parts(keyframe);
     }
-    if (status && status->n_views > 0 && keyframes_.count(status->newest_view) == 0)
-        out[status->newest_view] = UINT32_MAX;
+    if (!status || keyframes_.size() + announced.size() >= status->n_views) return out;
+    for (int id = 0; id <= status->newest_view && id < static_cast<int>(kMaxKeyframes); id++) {
+        if (keyframes_.count(id) == 0 && announced.count(id) == 0) out[id] = UINT32_MAX;
+    }
     return out;
 }
 

@@ -93,6 +93,11 @@ SessionOptions session_options(const std::string &method)
     return options;
 }
 
+void check_output(const OutputOptions &options)
+{
+    if (!options.path.empty()) read_path(options.path);
+}
+
 void write_output(Session &session, const Ledger &ledger, const ReceiveCounts &received, const OutputOptions &options,
                   const Progress &progress)
 {

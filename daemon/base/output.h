@@ -25,6 +25,10 @@ struct ReceiveCounts {
 
 using Progress = std::function<void(const std::string &)>;
 
+// What can be said before anything is computed: that a path file is one.
+// Throws std::runtime_error with one line.
+void check_output(const OutputOptions &options);
+
 // Settle the session and write everything but link.lcm. Each file appears
 // whole or not at all. Throws std::runtime_error with one line.
 void write_output(Session &session, const Ledger &ledger, const ReceiveCounts &received, const OutputOptions &options,

@@ -8,12 +8,18 @@
 
 #include "site/view.h"
 
+namespace lcm {
+class LCM;
+}
+
 namespace outcrop {
 
 class Republisher {
 public:
     // Throws std::runtime_error with one line when the URL cannot be opened.
     explicit Republisher(const std::string &url);
+    // On an LCM object that is open already.
+    explicit Republisher(std::shared_ptr<lcm::LCM> lcm);
     ~Republisher();
     Republisher(const Republisher &) = delete;
     Republisher &operator=(const Republisher &) = delete;
@@ -22,8 +28,7 @@ public:
     void publish(int vehicle, const View &view);
 
 private:
-    struct Lcm;
-    std::unique_ptr<Lcm> lcm_;
+    std::shared_ptr<lcm::LCM> lcm_;
     std::set<int> published_;
 };
 

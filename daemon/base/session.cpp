@@ -3,6 +3,8 @@
 #include "session.h"
 
 #include <algorithm>
+#include <iterator>
+#include <tuple>
 
 namespace outcrop {
 namespace {
@@ -22,6 +24,26 @@ bool is_block_known(const View &view, std::size_t block)
     return view.known(y, x) != 0;
 }
 
+bool is_same(const std::optional<Area> &a, const std::optional<Area> &b)
+{
+    if (!a || !b) return a.has_value() == b.has_value();
+    return std::tie(a->x_min, a->x_max, a->y_min, a->y_max, a->z_max) ==
+           std::tie(b->x_min, b->x_max, b->y_min, b->y_max, b->z_max);
+}
+
+// Only the named blocks stay known; the pixels are shared, what is known is not.
+void keep_blocks(const std::vector<std::uint16_t> &blocks, View *view)
+{
+    const int side = static_cast<int>(OC_BLOCK_PX), across = (view->known.cols + side - 1) / side;
+    cv::Mat1b kept(view->known.size(), std::uint8_t{0});
+    for (const std::uint16_t block : blocks) {
+        const cv::Rect place(block % across * side, block / across * side, side, side);
+        const cv::Rect inside = place & cv::Rect(0, 0, kept.cols, kept.rows);
+        view->known(inside).copyTo(kept(inside));
+    }
+    view->known = kept;
+}
+
 } // namespace
 
 Session::Session(const SessionOptions &options, Send send) : options_(options), send_(std::move(send))
@@ -36,6 +58,7 @@ Session::~Session() = default;
 
 void Session::on_evidence(double now_s)
 {
+    if (!has_news_) last_blocks_s_ = last_plan_s_ = now_s;
     has_news_ = true;
     last_news_s_ = now_s;
 }
@@ -47,22 +70,62 @@ FeedResult Session::receive(const std::uint8_t *packet, std::size_t n_bytes, dou
     if (vehicle_ < 0) vehicle_ = head.vehicle;
     if (head.vehicle != vehicle_) return FeedResult::kForeign;
 
-    if (head.type == OC_PACKET_IMAGE) {
-        oc_image_piece_t piece;
-        if (oc_packet_decode_image(packet, n_bytes, &piece) != OC_OK) return assembler_.feed(packet, n_bytes);
-        if (!rival_) rival_ = std::make_unique<NullRival>();
-        if (rival_->take(piece)) is_model_current_ = false;
-        on_evidence(now_s);
-        return FeedResult::kTaken;
-    }
+    if (head.type == OC_PACKET_IMAGE) return take_image(packet, n_bytes, now_s);
     const FeedResult result = assembler_.feed(packet, n_bytes);
-    if (result != FeedResult::kTaken || head.type == OC_PACKET_STATUS) return result;
-    on_evidence(now_s);
-    if (head.type != OC_PACKET_OVERHEAD) {
-        is_model_current_ = is_plan_current_ = false;
-        if (phase_ != Phase::kGather) phase_ = Phase::kGather;
+    if (result != FeedResult::kTaken) return result;
+    if (head.type == OC_PACKET_STATUS) {
+        note_status(now_s);
+        return result;
     }
+    if (head.type == OC_PACKET_VIEW) note_view(packet, n_bytes);
+    on_evidence(now_s);
+    if (head.type == OC_PACKET_OVERHEAD) return result;
+    is_model_current_ = false;
+    if (head.type != OC_PACKET_PATCH) is_plan_current_ = false; // pixels say nothing about what else is wanted
+    phase_ = Phase::kGather;
     return result;
+}
+
+FeedResult Session::take_image(const std::uint8_t *packet, std::size_t n_bytes, double now_s)
+{
+    oc_image_piece_t piece;
+    if (oc_packet_decode_image(packet, n_bytes, &piece) != OC_OK) return FeedResult::kIllFormed;
+    if (!rival_) rival_ = std::make_unique<NullRival>();
+    const FeedResult result = rival_->take(piece);
+    if (result != FeedResult::kTaken) return result;
+    on_evidence(now_s);
+    is_model_current_ = false;
+    phase_ = Phase::kGather;
+    return result;
+}
+
+// A status says that there are views, also when none of them came through; and where the work is.
+void Session::note_status(double now_s)
+{
+    const auto &status = assembler_.status();
+    if (status && status->n_views > 0 && !has_news_) on_evidence(now_s);
+    if (is_same(area(), known_area_)) return;
+    known_area_ = area();
+    is_model_current_ = is_plan_current_ = false;
+    phase_ = Phase::kGather;
+}
+
+void Session::note_view(const std::uint8_t *packet, std::size_t n_bytes)
+{
+    const auto part = std::make_unique<oc_view_part_t>();
+    if (oc_packet_decode_view(packet, n_bytes, part.get()) == OC_OK) heard_.insert(part->head.view);
+}
+
+// What the assembler misses, less the numbers that were never given out: a site folder's views need not be 0, 1, 2 ...
+std::map<int, std::uint32_t> Session::missing()
+{
+    const auto &status = assembler_.status();
+    if (rival_) return rival_->missing(status, assembler_.announced());
+    auto out = assembler_.missing();
+    if (!status || heard_.size() + assembler_.announced().size() < status->n_views) return out;
+    for (auto entry = out.begin(); entry != out.end();)
+        entry = heard_.count(entry->first) ? std::next(entry) : out.erase(entry);
+    return out;
 }
 
 const std::map<int, View> &Session::views()
@@ -86,8 +149,9 @@ std::optional<Area> Session::area() const
 
 bool Session::may_ask(Asked *asked, double now_s)
 {
-    if (asked->tries > 0 && now_s - asked->when_s < options_.retry_s) return false;
-    if (asked->tries > 0 && now_s - last_news_s_ < options_.quiet_s) return false;
+    // While anything still comes, the vehicle may be about to answer this one.
+    const double since_s = now_s - std::max(asked->when_s, last_news_s_);
+    if (asked->tries > 0 && since_s < options_.retry_s) return false;
     if (asked->tries == options_.max_tries) {
         asked->tries++;
         n_given_up_++;
@@ -109,9 +173,8 @@ oc_packet_head_t Session::next_head()
 // True while something is still expected.
 bool Session::ask_missing_parts(double now_s)
 {
-    const auto missing = rival_ ? rival_->missing(assembler_.status()) : assembler_.missing();
     bool is_waiting = false;
-    for (const auto &[view, parts] : missing) {
+    for (const auto &[view, parts] : missing()) {
         Asked &asked = asked_parts_[view];
         if (asked.tries > options_.max_tries) continue;
         is_waiting = true;
@@ -126,29 +189,49 @@ bool Session::ask_missing_parts(double now_s)
     return is_waiting;
 }
 
+// Blocks that a set of views calls for, whatever of them is known already.
+std::vector<WantedBlocks> Session::blocks_for(std::vector<View> list) const
+{
+    if (list.size() < 2) return {};
+    for (View &view : list)
+        view.known = cv::Mat1b(view.known.size(), std::uint8_t{0}); // not zeros(): that writes into the shared pixels
+    // The ties alone already narrow the poses, and narrow strips hold fewer candidates.
+    const RefineResult refined = refine_poses(list, {}, options_.build.refine);
+    std::vector<PosedView> posed;
+    for (std::size_t i = 0; i < list.size(); i++)
+        posed.push_back({&list[i], refined.views[i].camera, refined.matching_margins[i]});
+    WantedBlocksOptions wanted = options_.wanted;
+    wanted.strip.angles = OC_ANGLE_ERROR_LOCAL; // as refine_poses states its margins
+    const Area where = area().value_or(derive_area(list, options_.build));
+    return wanted_blocks(posed, select_pairs(posed, where, options_.build.pairs), where, {}, wanted);
+}
+
 // What the views seen so far call for joins what was called for before.
-void Session::plan_blocks()
+void Session::plan_blocks(double now_s)
 {
     is_plan_current_ = true;
-    const auto &views = assembler_.views();
+    last_blocks_s_ = now_s;
     std::vector<View> list;
-    for (const auto &[id, view] : views) list.push_back(view);
-    if (list.size() < 2) return;
-    std::vector<PosedView> posed;
-    std::vector<std::vector<std::uint8_t>> asked;
-    for (const View &view : list) {
-        posed.push_back(as_reported(view));
-        auto &flags = wanted_[view.id];
-        flags.resize(block_count(view), 0);
-        asked.push_back(flags);
+    for (const auto &[id, view] : assembler_.views()) {
+        list.push_back(view);
+        wanted_[id].resize(block_count(view), 0);
     }
-    const Area where = area().value_or(derive_area(list, options_.build));
-    const auto pairs = select_pairs(posed, where, options_.build.pairs);
-    for (const WantedBlocks &more : wanted_blocks(posed, pairs, where, asked, options_.wanted)) {
+    for (const WantedBlocks &more : blocks_for(list)) {
         auto &flags = wanted_[more.view];
-        for (const std::uint16_t block : more.blocks) flags[block] = 1;
-        asked_blocks_[more.view] = Asked{};
+        bool is_more = false;
+        for (const std::uint16_t block : more.blocks) {
+            is_more = is_more || flags[block] == 0;
+            flags[block] = 1;
+        }
+        if (is_more) asked_blocks_[more.view] = Asked{};
     }
+}
+
+// Later views relabel junctions as ground, which saves their pixels; so it
+// pays to wait for the end of the source, but not for long.
+bool Session::may_plan(bool is_waiting_for_parts, double now_s) const
+{
+    return (is_source_done(now_s) && !is_waiting_for_parts) || now_s - last_blocks_s_ >= options_.longest_plan_wait_s;
 }
 
 void Session::send_blocks(int view, const std::vector<std::uint16_t> &blocks)
@@ -173,10 +256,10 @@ void Session::send_blocks(int view, const std::vector<std::uint16_t> &blocks)
     }
 }
 
-bool Session::ask_blocks(double now_s)
+bool Session::ask_blocks(bool is_waiting_for_parts, double now_s)
 {
-    if (!is_plan_current_) plan_blocks();
-    bool is_waiting = false;
+    if (!is_plan_current_ && may_plan(is_waiting_for_parts, now_s)) plan_blocks(now_s);
+    bool is_waiting = !is_plan_current_;
     for (const auto &[id, view] : assembler_.views()) {
         const auto wanted = wanted_.find(id);
         if (wanted == wanted_.end()) continue;
@@ -220,10 +303,7 @@ void Session::send_tiles(const TileRequest &plan)
 
 bool Session::ask_tiles(double now_s)
 {
-    if (rival_) {
-        rival_->make_tiles(tile_plan_);
-        return false;
-    }
+    if (rival_) return false; // settle() has made them
     bool is_waiting = false;
     for (const TileRequest &plan : tile_plan_) {
         TileRequest left = plan;
@@ -251,13 +331,24 @@ bool Session::is_source_done(double now_s) const
     return (status && status->is_source_done) || now_s - last_news_s_ > options_.settle_quiet_s;
 }
 
+// Pixels that were asked for when less was known would make the model depend
+// on when the packets came; only what all views together call for counts.
+void Session::keep_wanted(std::vector<View> *list) const
+{
+    std::map<int, std::vector<std::uint16_t>> wanted;
+    for (WantedBlocks &one : blocks_for(*list)) wanted[one.view] = std::move(one.blocks);
+    for (View &view : *list) keep_blocks(wanted[view.id], &view);
+}
+
 const SiteModel &Session::settle()
 {
     if (is_model_current_) return model_;
     if (rival_) rival_views_ = rival_->make_views(area());
     std::vector<View> list;
     for (const auto &[id, view] : views()) list.push_back(view);
+    if (!rival_) keep_wanted(&list);
     model_ = build_site(list, area(), options_.build);
+    if (rival_) rival_->make_tiles(plan_overhead(model_, options_.overhead));
     is_model_current_ = true;
     return model_;
 }
@@ -271,9 +362,10 @@ void Session::step(double now_s)
 
     if (phase_ == Phase::kGather) {
         bool is_waiting = ask_missing_parts(now_s);
-        if (!rival_) is_waiting = ask_blocks(now_s) || is_waiting;
+        if (!rival_) is_waiting = ask_blocks(is_waiting, now_s) || is_waiting;
         if (is_waiting || !is_source_done(now_s)) return;
         settle();
+        if (views().empty()) return;
         tile_plan_ = plan_overhead(model_, options_.overhead);
         asked_tiles_.clear();
         phase_ = Phase::kOverhead;

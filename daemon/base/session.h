@@ -25,12 +25,13 @@ struct SessionOptions {
     BuildOptions build;
     OverheadOptions overhead;
     WantedBlocksOptions wanted;
-    int patch_quality = 16;      // 1..31
-    double quiet_s = 0.25;       // without packets before more is asked for
-    double longest_wait_s = 2.0; // or after so long while packets keep coming
-    double retry_s = 1.0;        // unanswered requests are repeated after this
-    int max_tries = 6;           // and given up after so many
-    double settle_quiet_s = 3.0; // an endless source settles after so long without news
+    int patch_quality = 8;             // 1..31
+    double quiet_s = 0.25;             // without packets before more is asked for
+    double longest_wait_s = 2.0;       // or after so long while packets keep coming
+    double longest_plan_wait_s = 10.0; // for a source to end before pixels are asked for
+    double retry_s = 1.0;              // unanswered requests are repeated after this
+    int max_tries = 6;                 // and given up after so many
+    double settle_quiet_s = 3.0;       // an endless source settles after so long without news
 };
 
 // A state machine without clock and network: time comes in with every call,
@@ -53,7 +54,8 @@ public:
     // for has come or been given up, and model() is of all that came.
     bool is_settled() const { return phase_ == Phase::kSettled; }
 
-    // Solve now from all that has come. The model is a pure function of the set of packets.
+    // Solve now from all that has come. The model is a pure function of the
+    // views and of those pixels that the views together call for.
     const SiteModel &settle();
 
     const std::map<int, View> &views();
@@ -62,6 +64,7 @@ public:
     const PacketAssembler &assembler() const { return assembler_; }
     std::optional<Area> area() const;
     std::uint64_t given_up() const { return n_given_up_; }
+    int vehicle() const { return vehicle_; } // -1 before one was heard
     bool is_null_rival() const { return rival_ != nullptr; }
 
 private:
@@ -72,10 +75,17 @@ private:
     };
 
     void on_evidence(double now_s);
+    FeedResult take_image(const std::uint8_t *packet, std::size_t n_bytes, double now_s);
+    void note_status(double now_s);
+    void note_view(const std::uint8_t *packet, std::size_t n_bytes);
+    std::map<int, std::uint32_t> missing();
     bool ask_missing_parts(double now_s);
-    bool ask_blocks(double now_s);
+    bool ask_blocks(bool is_waiting_for_parts, double now_s);
     bool ask_tiles(double now_s);
-    void plan_blocks();
+    std::vector<WantedBlocks> blocks_for(std::vector<View> list) const;
+    bool may_plan(bool is_waiting_for_parts, double now_s) const;
+    void plan_blocks(double now_s);
+    void keep_wanted(std::vector<View> *list) const;
     void send_blocks(int view, const std::vector<std::uint16_t> &blocks);
     void send_tiles(const TileRequest &request);
     bool may_ask(Asked *asked, double now_s);
@@ -89,16 +99,18 @@ private:
     std::map<int, View> rival_views_;
     Phase phase_ = Phase::kGather;
     SiteModel model_;
+    std::optional<Area> known_area_;
     bool is_model_current_ = false;
     bool is_plan_current_ = false;
 
+    std::set<int> heard_;                             // views of which a part came
     std::map<int, std::vector<std::uint8_t>> wanted_; // per view one byte per block, 1: wanted
     std::map<int, Asked> asked_blocks_, asked_parts_, asked_tiles_;
     std::vector<TileRequest> tile_plan_;
     std::uint64_t n_given_up_ = 0;
     std::uint16_t sequence_ = 0;
     int vehicle_ = -1;
-    double last_news_s_ = 0, last_plan_s_ = 0;
+    double last_news_s_ = 0, last_plan_s_ = 0, last_blocks_s_ = 0;
     bool has_news_ = false;
 };
 

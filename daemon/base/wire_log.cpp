@@ -2,9 +2,10 @@
 // The log's form: big-endian sync, event number, time, two lengths, then channel and payload.
 #include "wire_log.h"
 
-#include <array>
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
@@ -31,11 +32,69 @@ void put_be(std::uint8_t *out, std::uint64_t value, int n)
 
 std::vector<std::uint8_t> read_file(const std::string &path)
 {
+    if (std::filesystem::is_directory(path)) throw std::runtime_error(path + ": is a folder");
     std::ifstream file(path, std::ios::binary);
     if (!file) throw std::runtime_error(path + ": " + std::strerror(errno));
     std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
     if (file.bad()) throw std::runtime_error(path + ": cannot be read");
     return bytes;
+}
+
+// A sync word, or as much of one as the file has left.
+bool is_sync(const std::vector<std::uint8_t> &bytes, std::size_t at)
+{
+    std::uint8_t sync[4];
+    put_be(sync, kSync, 4);
+    const std::size_t n = std::min<std::size_t>(4, bytes.size() - at);
+    return std::equal(sync, sync + n, bytes.begin() + static_cast<std::ptrdiff_t>(at));
+}
+
+// The next sync word at or after a place, the file's size when there is none.
+std::size_t next_sync(const std::vector<std::uint8_t> &bytes, std::size_t at)
+{
+    while (at < bytes.size() && !is_sync(bytes, at)) at++;
+    return at;
+}
+
+std::size_t channel_bytes_at(const std::vector<std::uint8_t> &bytes, std::size_t at)
+{
+    return static_cast<std::size_t>(get_be(bytes.data() + at + 20, 4));
+}
+
+std::size_t payload_bytes_at(const std::vector<std::uint8_t> &bytes, std::size_t at)
+{
+    return static_cast<std::size_t>(get_be(bytes.data() + at + 24, 4));
+}
+
+// True when the lengths are possible or not there to be judged.
+bool has_possible_lengths(const std::vector<std::uint8_t> &bytes, std::size_t at)
+{
+    if (bytes.size() - at < kHeadBytes) return true;
+    return channel_bytes_at(bytes, at) > 0 && channel_bytes_at(bytes, at) <= kMaxChannelBytes &&
+           payload_bytes_at(bytes, at) <= kMaxPayloadBytes;
+}
+
+// Length of the event that begins here, 0 when there is none. An event that
+// another sync word follows neither at its end nor before it is followed by
+// garbage; with one inside and none at its end its length is wrong.
+std::size_t whole_event(const std::vector<std::uint8_t> &bytes, std::size_t at)
+{
+    const std::size_t left = bytes.size() - at;
+    if (left < kHeadBytes || !is_sync(bytes, at) || !has_possible_lengths(bytes, at)) return 0;
+    const std::size_t n = kHeadBytes + channel_bytes_at(bytes, at) + payload_bytes_at(bytes, at);
+    if (n > left) return 0;
+    if (n == left || is_sync(bytes, at + n)) return n;
+    return next_sync(bytes, at + 4) < at + n ? 0 : n;
+}
+
+LogEvent event_at(const std::vector<std::uint8_t> &bytes, std::size_t at)
+{
+    const std::uint8_t *channel = bytes.data() + at + kHeadBytes, *payload = channel + channel_bytes_at(bytes, at);
+    LogEvent event;
+    event.utime_us = static_cast<std::int64_t>(get_be(bytes.data() + at + 12, 8));
+    event.channel.assign(channel, payload);
+    event.payload.assign(payload, payload + payload_bytes_at(bytes, at));
+    return event;
 }
 
 } // namespace
@@ -46,36 +105,19 @@ LogFaults read_log(const std::string &path, const std::function<void(const LogEv
     LogFaults faults;
     std::size_t at = 0, n_events = 0;
     while (at < bytes.size()) {
-        const std::size_t left = bytes.size() - at;
-        const std::uint8_t *head = bytes.data() + at;
-        if (left < 4 || get_be(head, 4) != kSync) {
-            at++;
-            faults.garbage_bytes++;
+        const std::size_t event_bytes = whole_event(bytes, at);
+        if (event_bytes > 0) {
+            take(event_at(bytes, at));
+            n_events++;
+            at += event_bytes;
             continue;
         }
-        if (left < kHeadBytes) {
-            faults.is_cut = true;
-            break;
-        }
-        const auto channel_bytes = static_cast<std::uint32_t>(get_be(head + 20, 4));
-        const auto payload_bytes = static_cast<std::uint32_t>(get_be(head + 24, 4));
-        if (channel_bytes == 0 || channel_bytes > kMaxChannelBytes || payload_bytes > kMaxPayloadBytes) {
-            at += 4;
-            faults.garbage_bytes += 4;
-            continue;
-        }
-        if (left - kHeadBytes < std::size_t{channel_bytes} + payload_bytes) {
-            faults.is_cut = true;
-            break;
-        }
-        const std::uint8_t *channel = head + kHeadBytes, *payload = channel + channel_bytes;
-        LogEvent event;
-        event.utime_us = static_cast<std::int64_t>(get_be(head + 12, 8));
-        event.channel.assign(channel, payload);
-        event.payload.assign(payload, payload + payload_bytes);
-        take(event);
-        n_events++;
-        at += kHeadBytes + channel_bytes + payload_bytes;
+        const bool is_event = is_sync(bytes, at);
+        const std::size_t next = next_sync(bytes, at + 1);
+        // An event that begins and has no successor is cut; anything else that is no event is garbage.
+        faults.is_cut = next == bytes.size() && is_event && has_possible_lengths(bytes, at);
+        if (!faults.is_cut) faults.garbage_bytes += next - at;
+        at = next;
     }
     if (n_events == 0) throw std::runtime_error(path + ": holds no LCM event");
     return faults;

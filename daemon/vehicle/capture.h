@@ -40,8 +40,8 @@ typedef struct oc_margin_option {
     double position_m, angle_rad;
 } oc_margin_option_t;
 
-/* A site folder, or its cameras file. Checks every view and the header of
- * every picture before it returns; NULL and one line in error otherwise.
+/* A site folder, or its cameras file. Checks every view and decodes every
+ * picture once before it returns (some 5 ms each at 640 x 480); NULL and one line in error otherwise.
  * Margins: the option before the file before 0.5 % of the median distance from
  * camera to ground along the axis and 1 degree; `margin_used` says which. */
 oc_capture_t *oc_capture_open_site(const char *path, const oc_margin_option_t *margin, oc_margin_t *margin_used,

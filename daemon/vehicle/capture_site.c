@@ -16,6 +16,14 @@
 
 #define SITE_MAX_VIEWS 65535u
 
+/* What the link can carry (docs/protocol.md) or nobody means. */
+#define SITE_MAX_FOCAL_PX 1e6
+#define SITE_MAX_DISTORTION 1e6
+#define SITE_MAX_COORDINATE_M 2e5
+#define SITE_MAX_MARGIN_M 1e4
+#define SITE_MAX_MARGIN_DEG 45.0
+#define SITE_MAX_UTIME_US (((int64_t)1 << 56) - 1)
+
 typedef struct site_view {
     char *image_path;
     oc_captured_t frame; /* all but the pixels */
@@ -80,6 +88,19 @@ static bool read_size(const site_reader_t *r, const json_t *object, const char *
     return true;
 }
 
+static bool read_distortion(const site_reader_t *r, const json_t *view, size_t index, oc_captured_t *frame)
+{
+    const json_t *dist = json_object_get(view, "dist");
+    if (!dist) return true;
+    if (!read_array(r, dist, "dist", index, frame->distortion.k, 5)) return false;
+    for (int i = 0; i < 5; i++) {
+        if (!(fabs(frame->distortion.k[i]) <= SITE_MAX_DISTORTION))
+            return complain(r, "view %zu: \"dist\" is larger than %g", index, SITE_MAX_DISTORTION);
+        frame->has_distortion = frame->has_distortion || frame->distortion.k[i] != 0;
+    }
+    return true;
+}
+
 static bool read_intrinsics(const site_reader_t *r, const json_t *view, size_t index, oc_captured_t *frame)
 {
     oc_intrinsics_t *k = &frame->camera.k;
@@ -90,12 +111,10 @@ static bool read_intrinsics(const site_reader_t *r, const json_t *view, size_t i
     if (!read_number(r, view, "cx", index, &k->cx_px)) return false;
     if (!read_number(r, view, "cy", index, &k->cy_px)) return false;
     if (!(k->fx_px > 0) || !(k->fy_px > 0)) return complain(r, "view %zu: focal length is not positive", index);
+    if (k->fx_px < 1 || k->fx_px > SITE_MAX_FOCAL_PX || k->fy_px < 1 || k->fy_px > SITE_MAX_FOCAL_PX)
+        return complain(r, "view %zu: focal length is not within 1..%g px", index, SITE_MAX_FOCAL_PX);
     if (!oc_intrinsics_is_valid(k)) return complain(r, "view %zu: principal point is far outside the image", index);
-    const json_t *dist = json_object_get(view, "dist");
-    if (!dist) return true;
-    if (!read_array(r, dist, "dist", index, frame->distortion.k, 5)) return false;
-    for (int i = 0; i < 5; i++) frame->has_distortion = frame->has_distortion || frame->distortion.k[i] != 0;
-    return true;
+    return read_distortion(r, view, index, frame);
 }
 
 static bool read_pose(const site_reader_t *r, const json_t *view, size_t index, oc_pose_t *pose)
@@ -108,7 +127,21 @@ static bool read_pose(const site_reader_t *r, const json_t *view, size_t index, 
     }
     if (!read_array(r, json_object_get(view, "t"), "t", index, pose->t, 3)) return false;
     for (int i = 0; i < 3; i++) pose->t[i] *= r->metres_per_unit;
+    /* A rotation turns -t into the centre and leaves its length. */
+    if (!(hypot(hypot(pose->t[0], pose->t[1]), pose->t[2]) <= SITE_MAX_COORDINATE_M))
+        return complain(r, "view %zu: the camera is more than %g km away", index, SITE_MAX_COORDINATE_M * 1e-3);
     if (!oc_pose_is_valid(pose)) return complain(r, "view %zu: \"R\" is not a rotation", index);
+    return true;
+}
+
+static bool read_time(const site_reader_t *r, const json_t *view, size_t index, int64_t *utime_us)
+{
+    const json_t *utime = json_object_get(view, "utime");
+    *utime_us = SITE_EPOCH_US + (int64_t)index * 1000000;
+    if (!utime) return true;
+    if (!json_is_integer(utime) || json_integer_value(utime) < 0 || json_integer_value(utime) > SITE_MAX_UTIME_US)
+        return complain(r, "view %zu: \"utime\" is not microseconds since 1970", index);
+    *utime_us = json_integer_value(utime);
     return true;
 }
 
@@ -128,9 +161,8 @@ static bool read_view(const site_reader_t *r, const char *folder, const json_t *
     if (!json_is_string(image)) return complain(r, "view %zu: \"image\" is missing or not a string", index);
     if (!read_intrinsics(r, view, index, frame)) return false;
     if (!read_pose(r, view, index, &frame->camera.pose)) return false;
+    if (!read_time(r, view, index, &frame->utime_us)) return false;
 
-    const json_t *utime = json_object_get(view, "utime");
-    frame->utime_us = json_is_integer(utime) ? json_integer_value(utime) : SITE_EPOCH_US + (int64_t)index * 1000000;
     const json_t *id = json_object_get(view, "index");
     if (id && (!json_is_integer(id) || json_integer_value(id) < 0 || json_integer_value(id) >= SITE_MAX_VIEWS))
         return complain(r, "view %zu: \"index\" is not within 0..%u", index, SITE_MAX_VIEWS - 1);
@@ -167,11 +199,15 @@ static bool read_range(const site_reader_t *r, const json_t *area, const char *k
 {
     const json_t *range = json_object_get(area, key);
     const json_t *a = json_array_get(range, 0), *b = json_array_get(range, 1);
-    if (json_array_size(range) != 2 || !json_is_number(a) || !json_is_number(b) ||
-        !(json_number_value(a) < json_number_value(b)))
+    if (json_array_size(range) != 2 || !json_is_number(a) || !json_is_number(b))
         return complain(r, "area: \"%s\" must be two ascending numbers", key);
-    *low = json_number_value(a) * r->metres_per_unit;
-    *high = json_number_value(b) * r->metres_per_unit;
+    const double from_m = json_number_value(a) * r->metres_per_unit, to_m = json_number_value(b) * r->metres_per_unit;
+    if (!(fabs(from_m) <= SITE_MAX_COORDINATE_M && fabs(to_m) <= SITE_MAX_COORDINATE_M))
+        return complain(r, "area: \"%s\" reaches farther than %g km", key, SITE_MAX_COORDINATE_M * 1e-3);
+    if (!((float)from_m < (float)to_m)) /* as they travel */
+        return complain(r, "area: \"%s\" must be two ascending numbers", key);
+    *low = from_m;
+    *high = to_m;
     return true;
 }
 
@@ -182,9 +218,9 @@ static bool read_area(const site_reader_t *r, const json_t *root, oc_area_t *out
     if (!read_range(r, area, "x", &out->x_min, &out->x_max)) return false;
     if (!read_range(r, area, "y", &out->y_min, &out->y_max)) return false;
     const json_t *z_max = json_object_get(area, "z_max");
-    if (!json_is_number(z_max) || !(json_number_value(z_max) > 0))
+    out->z_max = json_is_number(z_max) ? json_number_value(z_max) * r->metres_per_unit : 0;
+    if (!(out->z_max >= 1e-6 && out->z_max <= SITE_MAX_COORDINATE_M))
         return complain(r, "area: \"z_max\" must be a positive number");
-    out->z_max = json_number_value(z_max) * r->metres_per_unit;
     out->is_set = true;
     return true;
 }
@@ -226,6 +262,9 @@ static bool read_margins(const site_reader_t *r, const json_t *root, const oc_ma
             return complain(r, "\"margins\" must hold \"position\" and \"angle_deg\", not negative");
         position_m = json_number_value(position) * r->metres_per_unit;
         angle_rad = json_number_value(angle) * M_PI / 180;
+        if (position_m > SITE_MAX_MARGIN_M || angle_rad > SITE_MAX_MARGIN_DEG * M_PI / 180)
+            return complain(r, "\"margins\" are larger than %g m or %g degrees", SITE_MAX_MARGIN_M,
+                            SITE_MAX_MARGIN_DEG);
     }
     if (!isnan(option->position_m)) position_m = option->position_m;
     if (!isnan(option->angle_rad)) angle_rad = option->angle_rad;
@@ -261,13 +300,30 @@ static bool read_site(site_reader_t *r, const char *folder, const json_t *root, 
     return read_margins(r, root, option, site, used);
 }
 
+static oc_image_mut_t site_pixels(const site_capture_t *site, const site_view_t *view)
+{
+    const oc_intrinsics_t *k = &view->frame.camera.k;
+    return (oc_image_mut_t){site->px, k->width_px, k->height_px, 3 * k->width_px, 3};
+}
+
+/* A broken picture is found before anything is sent, not in the middle of a drive. */
+static bool read_pictures(const site_reader_t *r, site_capture_t *site)
+{
+    site->px = malloc((size_t)site->base.max_width_px * site->base.max_height_px * 3);
+    if (!site->px) return complain(r, "out of memory");
+    for (uint32_t i = 0; i < site->n_views; i++) {
+        oc_image_mut_t out = site_pixels(site, &site->views[i]);
+        if (!oc_image_file_read(site->views[i].image_path, &out, r->error, r->error_bytes)) return false;
+    }
+    return true;
+}
+
 static oc_capture_result_t site_next(oc_capture_t *self, oc_captured_t *frame, char *error, size_t error_bytes)
 {
     site_capture_t *site = (site_capture_t *)self;
     if (site->next_view == site->n_views) return OC_CAPTURE_DONE;
     const site_view_t *view = &site->views[site->next_view++];
-    oc_image_mut_t out = {site->px, view->frame.camera.k.width_px, view->frame.camera.k.height_px,
-                          3 * view->frame.camera.k.width_px, 3};
+    oc_image_mut_t out = site_pixels(site, view);
     if (!oc_image_file_read(view->image_path, &out, error, error_bytes)) return OC_CAPTURE_ERROR;
     *frame = view->frame;
     frame->image = (oc_image_t){out.px, out.width_px, out.height_px, out.stride_bytes, out.channels};
@@ -291,6 +347,17 @@ static char *cameras_path(const char *path)
     return strdup(path);
 }
 
+static json_t *load_cameras(const char *file, char *error, size_t error_bytes)
+{
+    json_error_t fault;
+    json_t *root = json_load_file(file, JSON_REJECT_DUPLICATES, &fault);
+    if (root) return root;
+    char line[32] = "";
+    if (fault.line > 0) snprintf(line, sizeof line, "line %d: ", fault.line);
+    snprintf(error, error_bytes, "%s: %s%s", file, line, fault.text);
+    return NULL;
+}
+
 oc_capture_t *oc_capture_open_site(const char *path, const oc_margin_option_t *margin, oc_margin_t *margin_used,
                                    char *error, size_t error_bytes)
 {
@@ -306,21 +373,12 @@ oc_capture_t *oc_capture_open_site(const char *path, const oc_margin_option_t *m
     strcpy(slash ? slash : folder, slash ? "" : ".");
     if (slash == folder) strcpy(folder, "/.");
 
-    json_error_t fault;
-    root = json_load_file(file, JSON_REJECT_DUPLICATES, &fault);
-    if (!root) {
-        const char *where = fault.line > 0 ? "line " : "";
-        char line[16] = "";
-        if (fault.line > 0) snprintf(line, sizeof line, "%d: ", fault.line);
-        snprintf(error, error_bytes, "%s: %s%s%s", file, where, line, fault.text);
-        goto done;
-    }
+    root = load_cameras(file, error, error_bytes);
+    if (!root) goto done;
     site_reader_t reader = {file, error, error_bytes, 1};
-    is_ok = read_site(&reader, folder, root, margin, site, margin_used);
-    if (is_ok) {
-        site->px = malloc((size_t)site->base.max_width_px * site->base.max_height_px * 3);
-        is_ok = site->px != NULL || complain(&reader, "out of memory");
-    }
+    oc_margin_t used;
+    is_ok = read_site(&reader, folder, root, margin, site, &used) && read_pictures(&reader, site);
+    if (is_ok) *margin_used = used;
     site->base.next = site_next;
     site->base.close = site_close;
 

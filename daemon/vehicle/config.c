@@ -8,6 +8,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "config_yaml.h"
+
 /* The file as the schema loads it: optional scalars are pointers, NULL = not given. */
 typedef struct yaml_link {
     char *down_url, *up_url, *send, *codec;
@@ -80,20 +82,6 @@ static const cyaml_schema_field_t file_fields[] = {
     CYAML_FIELD_END};
 
 static const cyaml_schema_value_t file_schema = {CYAML_VALUE_MAPPING(CYAML_FLAG_POINTER, yaml_file_t, file_fields)};
-
-/* libcyaml's first complaint; later ones only trace the way up to it. */
-typedef struct yaml_log {
-    char text[200];
-} yaml_log_t;
-
-__attribute__((format(printf, 3, 0))) static void yaml_on_log(cyaml_log_t level, void *context, const char *format,
-                                                              va_list args)
-{
-    yaml_log_t *log = context;
-    if (level < CYAML_LOG_ERROR || log->text[0]) return;
-    vsnprintf(log->text, sizeof log->text, format, args);
-    log->text[strcspn(log->text, "\n")] = '\0';
-}
 
 typedef struct config_reader {
     const char *file;
@@ -189,21 +177,12 @@ static void take_file(config_reader_t *r, const yaml_file_t *file, oc_config_t *
 
 bool oc_config_load(const char *path, oc_config_t *config, char *error, size_t error_bytes)
 {
-    yaml_log_t log = {""};
-    const cyaml_config_t cyaml = {
-        .log_fn = yaml_on_log, .log_ctx = &log, .log_level = CYAML_LOG_ERROR, .mem_fn = cyaml_mem};
-    yaml_file_t *file = NULL;
-    const cyaml_err_t fault = cyaml_load_file(path, &cyaml, &file_schema, (cyaml_data_t **)&file, NULL);
-    if (fault != CYAML_OK) {
-        /* "Load: Unexpected key: x" and the like say more than the code does. */
-        const char *text = log.text[0] ? log.text : cyaml_strerror(fault);
-        snprintf(error, error_bytes, "%s: %s", path, text);
-        return false;
-    }
+    void *data = NULL;
+    if (!oc_yaml_load(path, &file_schema, &data, error, error_bytes)) return false;
     oc_config_t fresh = {.vehicle = oc_vehicle_defaults()};
     config_reader_t reader = {path, error, error_bytes, false};
-    take_file(&reader, file, &fresh);
-    cyaml_free(&cyaml, &file_schema, file, 0);
+    take_file(&reader, data, &fresh);
+    oc_yaml_free(&file_schema, data);
     if (reader.is_bad) return false;
     *config = fresh;
     return true;

@@ -90,7 +90,8 @@ static bool png_read(FILE *file, const char *path, oc_image_mut_t *out, uint32_t
         size[1] = png.height;
         if (out && out->width_px == size[0] && out->height_px == size[1]) {
             png.format = PNG_FORMAT_RGB;
-            is_ok = png_image_finish_read(&png, NULL, out->px, (png_int_32)out->stride_bytes, NULL) != 0;
+            const png_color black = {0, 0, 0}; /* under transparent pixels; else they would keep the last picture's */
+            is_ok = png_image_finish_read(&png, &black, out->px, (png_int_32)out->stride_bytes, NULL) != 0;
         }
     }
     if (!is_ok) snprintf(error, error_bytes, "%s: %s", path, png.message);

@@ -36,9 +36,10 @@ typedef struct vehicle_run {
     oc_image_sender_t *images; /* only in image mode */
     void *block;
     int signal_fd;
+    char fault[160]; /* why the loop ended, "" = a signal */
 
     int64_t start_ns, next_frame_ns, next_status_ns, next_send_ns;
-    bool is_source_done, is_stopped;
+    bool is_source_done, is_stopped, is_hangup_told;
     uint64_t bytes_sent;
     uint16_t n_images, newest_image;
 
@@ -109,8 +110,10 @@ static void run_push_image(vehicle_run_t *run, const oc_captured_t *captured)
                                  .has_distortion = captured->has_distortion,
                                  .distortion = captured->distortion};
     if (!oc_image_sender_push(run->images, &head, &captured->image)) {
-        fprintf(stderr, "outcropd: view %u: the codec failed, not sent\n", head.view);
-        oc_vehicle_count(run->vehicle, OC_COUNT_VIEWS_DROPPED);
+        /* A rival that leaves views out is no rival: say so and end. */
+        snprintf(run->fault, sizeof run->fault,
+                 "view %u: cannot be sent whole: the codec failed, or it takes more than 256 datagrams", head.view);
+        run->is_stopped = true;
         return;
     }
     run->n_images++;
@@ -248,14 +251,25 @@ static bool run_send_next(vehicle_run_t *run)
     size_t n_bytes = 0;
     if (run->images) {
         const oc_packet_head_t head = run_packet_head(run);
-        if (!oc_image_sender_next(run->images, &head, run->packet, run->config->vehicle.datagram_bytes, &n_bytes))
-            return false;
+        if (!oc_image_sender_next(run->images, &head, run->packet, &n_bytes)) return false;
         return run_send(run, n_bytes);
     }
     if (oc_vehicle_next(run->vehicle, run->packet, run->config->vehicle.datagram_bytes, &n_bytes) != OC_OK)
         return false;
     if (n_bytes == 0) n_bytes = run_next_tile(run);
     return n_bytes > 0 && run_send(run, n_bytes);
+}
+
+static void run_take_signal(vehicle_run_t *run)
+{
+    struct signalfd_siginfo info;
+    if (read(run->signal_fd, &info, sizeof info) != (ssize_t)sizeof info) return;
+    if (info.ssi_signo != SIGHUP) {
+        run->is_stopped = true;
+    } else if (!run->is_hangup_told) {
+        fprintf(stderr, "outcropd: SIGHUP ignored: restart to read the configuration anew\n");
+        run->is_hangup_told = true;
+    }
 }
 
 static void run_wait(vehicle_run_t *run, bool has_more)
@@ -269,22 +283,13 @@ static void run_wait(vehicle_run_t *run, bool has_more)
     const struct timespec timeout = {wait_ns / 1000000000LL, wait_ns % 1000000000LL};
     const int n = ppoll(fds, 2, &timeout, NULL);
     if (n < 0 && errno != EINTR) {
-        fprintf(stderr, "outcropd: poll: %s\n", strerror(errno));
+        snprintf(run->fault, sizeof run->fault, "poll: %s", strerror(errno));
         run->is_stopped = true;
     }
     if (n <= 0) return;
-    if (fds[1].revents & POLLIN) {
-        struct signalfd_siginfo info;
-        if (read(run->signal_fd, &info, sizeof info) == (ssize_t)sizeof info) {
-            if (info.ssi_signo == SIGHUP) {
-                fprintf(stderr, "outcropd: SIGHUP ignored: restart to read the configuration anew\n");
-            } else {
-                run->is_stopped = true;
-            }
-        }
-    }
+    if (fds[1].revents & POLLIN) run_take_signal(run);
     if (fds[0].revents && oc_link_handle(run->link, 0) < 0) {
-        fprintf(stderr, "outcropd: the link failed\n");
+        snprintf(run->fault, sizeof run->fault, "the link failed");
         run->is_stopped = true;
     }
 }
@@ -329,8 +334,8 @@ static bool run_open(vehicle_run_t *run, char *error, size_t error_bytes)
     }
     run->rectify = oc_rectify_create(vehicle.max_width_px, vehicle.max_height_px);
     if (run->config->mode == OC_LINK_IMAGES)
-        run->images =
-            oc_image_sender_create(vehicle.stored_views, run->config->image_codec, run->config->image_quality);
+        run->images = oc_image_sender_create(vehicle.stored_views, run->config->image_codec, run->config->image_quality,
+                                             vehicle.datagram_bytes);
     if (!run->rectify || (run->config->mode == OC_LINK_IMAGES && !run->images)) {
         snprintf(error, error_bytes, "out of memory");
         return false;
@@ -374,7 +379,9 @@ bool oc_run(const oc_config_t *config, oc_capture_t *capture, char *error, size_
     bool is_ok = run_open(run, error, error_bytes);
     if (is_ok) {
         run_loop(run);
-        if (config->debug_dump[0] && !run->images)
+        if (run->fault[0]) snprintf(error, error_bytes, "%s", run->fault);
+        is_ok = run->fault[0] == '\0';
+        if (is_ok && config->debug_dump[0] && !run->images)
             is_ok = oc_debug_dump(run->vehicle, config->debug_dump, error, error_bytes);
     }
     run_close(run);

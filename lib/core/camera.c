@@ -57,8 +57,8 @@ bool oc_pose_is_valid(const oc_pose_t *pose)
 
 /* ---- intrinsics and poses ---- */
 
-oc_intrinsics_t oc_intrinsics_from_format(double focal, double format_width, double format_height,
-                                          uint32_t width_px, uint32_t height_px)
+oc_intrinsics_t oc_intrinsics_from_format(double focal, double format_width, double format_height, uint32_t width_px,
+                                          uint32_t height_px)
 {
     const oc_intrinsics_t k = {
         .fx_px = focal * (double)width_px / format_width,
@@ -197,8 +197,8 @@ void oc_distort(const oc_intrinsics_t *k, const oc_distortion_t *d, double x_px,
     *yd_px = k->fy_px * (y * radial + dy) + k->cy_px;
 }
 
-oc_status_t oc_undistort(const oc_intrinsics_t *k, const oc_distortion_t *d, double xd_px, double yd_px,
-                         double *x_px, double *y_px)
+oc_status_t oc_undistort(const oc_intrinsics_t *k, const oc_distortion_t *d, double xd_px, double yd_px, double *x_px,
+                         double *y_px)
 {
     OC_ASSERT(k && d && x_px && y_px);
 

@@ -76,8 +76,8 @@ void oc_cv_from_thesis(const double R_th[9], double R_cv[9]);
 
 /* Eq 2.12: focal length and film format in the same unit -> pixels; principal
  * point at the image centre. */
-oc_intrinsics_t oc_intrinsics_from_format(double focal, double format_width, double format_height,
-                                          uint32_t width_px, uint32_t height_px);
+oc_intrinsics_t oc_intrinsics_from_format(double focal, double format_width, double format_height, uint32_t width_px,
+                                          uint32_t height_px);
 
 /* ---- poses ---- */
 void oc_pose_from_centre(const double R_cv[9], const double centre[3], oc_pose_t *pose);
@@ -108,10 +108,10 @@ void oc_camera_ray(const oc_camera_t *camera, double x_px, double y_px, double d
 
 /* Distorted pixel of an undistorted one, same intrinsics (plumb-bob), and the
  * inverse by fixed-point iteration (OC_E_DEGENERATE when it does not settle). */
-void oc_distort(const oc_intrinsics_t *k, const oc_distortion_t *d, double x_px, double y_px,
-                double *xd_px, double *yd_px);
-OC_CHECKED oc_status_t oc_undistort(const oc_intrinsics_t *k, const oc_distortion_t *d, double xd_px,
-                                    double yd_px, double *x_px, double *y_px);
+void oc_distort(const oc_intrinsics_t *k, const oc_distortion_t *d, double x_px, double y_px, double *xd_px,
+                double *yd_px);
+OC_CHECKED oc_status_t oc_undistort(const oc_intrinsics_t *k, const oc_distortion_t *d, double xd_px, double yd_px,
+                                    double *x_px, double *y_px);
 
 #ifdef __cplusplus
 }

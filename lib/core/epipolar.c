@@ -138,9 +138,8 @@ oc_status_t oc_epipolar_midpoint(const oc_camera_t *left, double x_px, double y_
     return OC_OK;
 }
 
-oc_status_t oc_epipolar_midpoint_covariance(const oc_camera_t *left, double x_px, double y_px,
-                                            const oc_camera_t *right, double x2_px, double y2_px, double sigma_px,
-                                            double cov_m2[9])
+oc_status_t oc_epipolar_midpoint_covariance(const oc_camera_t *left, double x_px, double y_px, const oc_camera_t *right,
+                                            double x2_px, double y2_px, double sigma_px, double cov_m2[9])
 {
     OC_ASSERT(left && right && cov_m2);
 

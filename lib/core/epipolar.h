@@ -54,9 +54,8 @@ typedef struct oc_midpoint {
  * 5.28 = 6.1, the last factor read as C'^T). The point is not refused for
  * being behind a camera: look at the depths. OC_E_ARG for a pixel that is not
  * finite, OC_E_DEGENERATE below OC_MIN_PARALLAX_RAD. */
-OC_CHECKED oc_status_t oc_epipolar_midpoint(const oc_camera_t *left, double x_px, double y_px,
-                                            const oc_camera_t *right, double x2_px, double y2_px,
-                                            oc_midpoint_t *out);
+OC_CHECKED oc_status_t oc_epipolar_midpoint(const oc_camera_t *left, double x_px, double y_px, const oc_camera_t *right,
+                                            double x2_px, double y2_px, oc_midpoint_t *out);
 
 /* First-order covariance (row-major 3x3, m^2) of the midpoint for independent
  * pixel errors of sigma_px in both views, exact poses. Central differences:

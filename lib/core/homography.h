@@ -27,8 +27,7 @@ OC_CHECKED oc_status_t oc_homography_jacobian(const double H[9], double x, doubl
 
 /* Image of a direction at (x, y): the angle of J (cos a, sin a), in [0, 2 pi).
  * OC_E_DEGENERATE when J sends it to 0. */
-OC_CHECKED oc_status_t oc_homography_angle(const double H[9], double x, double y, double angle_rad,
-                                           double *angle2_rad);
+OC_CHECKED oc_status_t oc_homography_angle(const double H[9], double x, double y, double angle_rad, double *angle2_rad);
 
 /* H' = T(m2 - H m) H: H moved so that it sends (x, y) to (x2, y2) exactly.
  *

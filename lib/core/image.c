@@ -62,8 +62,10 @@ oc_status_t oc_image_to_grey(const oc_image_t *image, oc_image_mut_t *grey)
     for (uint32_t y = 0; y < image->height_px; y++) {
         const uint8_t *from = image->px + (size_t)y * image->stride_bytes;
         uint8_t *to = grey->px + (size_t)y * grey->stride_bytes;
-        if (image->channels == 1) memmove(to, from, image->width_px);
-        else grey_row(from, to, image->width_px);
+        if (image->channels == 1)
+            memmove(to, from, image->width_px);
+        else
+            grey_row(from, to, image->width_px);
     }
     return OC_OK;
 }

@@ -106,8 +106,7 @@ static inline void oc_mat3_mul_point(const double a[9], double x, double y, doub
 
 static inline double oc_mat3_det(const double a[9])
 {
-    return a[0] * (a[4] * a[8] - a[5] * a[7]) - a[1] * (a[3] * a[8] - a[5] * a[6]) +
-           a[2] * (a[3] * a[7] - a[4] * a[6]);
+    return a[0] * (a[4] * a[8] - a[5] * a[7]) - a[1] * (a[3] * a[8] - a[5] * a[6]) + a[2] * (a[3] * a[7] - a[4] * a[6]);
 }
 
 static inline double oc_mat3_norm(const double a[9])

@@ -139,7 +139,7 @@ typedef struct oc_overhead_request {
     double image_from_ground[9]; /* the base's refined planar perspective matrix; float32 on the wire */
     double metres_per_pixel;     /* float32 on the wire */
     uint16_t tile_px;            /* 16..256 */
-    uint8_t quality;             /* codec quality to start from, 1..100; the vehicle lowers it until the tile fits a datagram */
+    uint8_t quality; /* codec quality to start from, 1..100; the vehicle lowers it until the tile fits a datagram */
     uint16_t n_tiles;
     oc_tile_id_t tiles[OC_MAX_REQUEST_TILES];
 } oc_overhead_request_t;
@@ -198,11 +198,11 @@ typedef struct oc_area {
 
 typedef struct oc_vehicle_status {
     uint32_t uptime_s;
-    uint16_t n_views;     /* views and announcements given out so far */
-    uint16_t newest_view; /* valid when n_views > 0 */
-    bool is_source_done;  /* a site folder has been played to its end */
-    uint32_t bytes_sent;  /* packets, without LCM's overhead */
-    oc_area_t area;       /* float32 on the wire; the base falls back on it */
+    uint16_t n_views;                 /* views and announcements given out so far */
+    uint16_t newest_view;             /* valid when n_views > 0 */
+    bool is_source_done;              /* a site folder has been played to its end */
+    uint32_t bytes_sent;              /* packets, without LCM's overhead */
+    oc_area_t area;                   /* float32 on the wire; the base falls back on it */
     uint32_t counters[OC_N_COUNTERS]; /* saturate at 65535 on the wire */
 } oc_vehicle_status_t;
 
@@ -220,9 +220,9 @@ typedef struct oc_vehicle_status {
  * Sets part->is_last by itself; head->part is the caller's. */
 OC_CHECKED oc_status_t oc_packet_encode_view(const oc_packet_head_t *packet, const oc_view_head_t *head,
                                              oc_junction_t junctions[], uint16_t n_junctions, uint16_t first,
-                                             const oc_tie_t ties[], uint16_t n_ties, uint16_t first_tie,
-                                             uint8_t *buf, size_t cap, size_t *n_bytes,
-                                             uint16_t *junctions_taken, uint16_t *ties_taken);
+                                             const oc_tie_t ties[], uint16_t n_ties, uint16_t first_tie, uint8_t *buf,
+                                             size_t cap, size_t *n_bytes, uint16_t *junctions_taken,
+                                             uint16_t *ties_taken);
 OC_CHECKED oc_status_t oc_packet_encode_relabel(const oc_packet_head_t *packet, const oc_relabel_t *relabel,
                                                 uint8_t *buf, size_t cap, size_t *n_bytes);
 /* As many of the n_blocks as fit, from the first on; grey is the view's image. */
@@ -243,13 +243,13 @@ OC_CHECKED oc_status_t oc_packet_encode_status(const oc_packet_head_t *packet, c
 OC_CHECKED oc_status_t oc_packet_encode_resend(const oc_packet_head_t *packet, const oc_resend_request_t *request,
                                                uint8_t *buf, size_t cap, size_t *n_bytes);
 /* As many blocks as fit. */
-OC_CHECKED oc_status_t oc_packet_encode_patch_request(const oc_packet_head_t *packet,
-                                                      const oc_patch_request_t *request, uint8_t *buf, size_t cap,
-                                                      size_t *n_bytes, uint16_t *blocks_taken);
+OC_CHECKED oc_status_t oc_packet_encode_patch_request(const oc_packet_head_t *packet, const oc_patch_request_t *request,
+                                                      uint8_t *buf, size_t cap, size_t *n_bytes,
+                                                      uint16_t *blocks_taken);
 /* As many tiles as fit. */
 OC_CHECKED oc_status_t oc_packet_encode_overhead_request(const oc_packet_head_t *packet,
-                                                         const oc_overhead_request_t *request, uint8_t *buf,
-                                                         size_t cap, size_t *n_bytes, uint16_t *tiles_taken);
+                                                         const oc_overhead_request_t *request, uint8_t *buf, size_t cap,
+                                                         size_t *n_bytes, uint16_t *tiles_taken);
 
 /* ---- decoding ----
  * head first (checks length, version, type, CRC), then the body by its type.
@@ -263,8 +263,7 @@ OC_CHECKED oc_status_t oc_packet_decode_image(const uint8_t *buf, size_t n_bytes
 OC_CHECKED oc_status_t oc_packet_decode_announce(const uint8_t *buf, size_t n_bytes, oc_announce_t *announce);
 OC_CHECKED oc_status_t oc_packet_decode_status(const uint8_t *buf, size_t n_bytes, oc_vehicle_status_t *status);
 OC_CHECKED oc_status_t oc_packet_decode_resend(const uint8_t *buf, size_t n_bytes, oc_resend_request_t *request);
-OC_CHECKED oc_status_t oc_packet_decode_patch_request(const uint8_t *buf, size_t n_bytes,
-                                                      oc_patch_request_t *request);
+OC_CHECKED oc_status_t oc_packet_decode_patch_request(const uint8_t *buf, size_t n_bytes, oc_patch_request_t *request);
 OC_CHECKED oc_status_t oc_packet_decode_overhead_request(const uint8_t *buf, size_t n_bytes,
                                                          oc_overhead_request_t *request);
 

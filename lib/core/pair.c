@@ -19,8 +19,7 @@ typedef struct pair_matrices {
     double left_height_m;
 } pair_matrices_t;
 
-void oc_pair_move_camera(const oc_camera_t *camera, int i, double delta, oc_angle_error_t angles,
-                         oc_camera_t *moved)
+void oc_pair_move_camera(const oc_camera_t *camera, int i, double delta, oc_angle_error_t angles, oc_camera_t *moved)
 {
     OC_ASSERT(camera && moved && i >= 0 && i < 6);
 

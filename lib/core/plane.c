@@ -63,8 +63,7 @@ bool oc_plane_is_ground(const double ground_from_image[9], double x_px, double y
     return (here > 0.0 && there > 0.0) || (here < 0.0 && there < 0.0);
 }
 
-oc_status_t oc_plane_ground_point(const double ground_from_image[9], double x_px, double y_px, double *x_m,
-                                  double *y_m)
+oc_status_t oc_plane_ground_point(const double ground_from_image[9], double x_px, double y_px, double *x_m, double *y_m)
 {
     OC_ASSERT(ground_from_image && x_m && y_m);
 
@@ -97,8 +96,8 @@ static double plane_distance(const oc_plane_t *plane, const double centre[3], bo
     return distance;
 }
 
-oc_status_t oc_plane_homography(const oc_camera_t *left, const oc_camera_t *right, const oc_plane_t *plane,
-                                double H[9], bool *same_side)
+oc_status_t oc_plane_homography(const oc_camera_t *left, const oc_camera_t *right, const oc_plane_t *plane, double H[9],
+                                bool *same_side)
 {
     OC_ASSERT(left && right && plane && H);
 
@@ -171,8 +170,7 @@ oc_status_t oc_edge_direction(const oc_edge3_t *left, const oc_edge3_t *right, o
     return OC_OK;
 }
 
-oc_status_t oc_plane_from_directions(const double d1[3], const double d2[3], const double point_m[3],
-                                     oc_plane_t *plane)
+oc_status_t oc_plane_from_directions(const double d1[3], const double d2[3], const double point_m[3], oc_plane_t *plane)
 {
     OC_ASSERT(d1 && d2 && point_m && plane);
 
@@ -192,8 +190,8 @@ oc_status_t oc_plane_from_junction(const oc_camera_t *left_camera, const oc_edge
     OC_ASSERT(left_camera && left && right_camera && right && plane);
 
     oc_midpoint_t mid;
-    oc_status_t status = oc_epipolar_midpoint(left_camera, left[0].x_px, left[0].y_px, right_camera, right[0].x_px,
-                                              right[0].y_px, &mid);
+    oc_status_t status =
+        oc_epipolar_midpoint(left_camera, left[0].x_px, left[0].y_px, right_camera, right[0].x_px, right[0].y_px, &mid);
     if (status != OC_OK) return status;
 
     oc_edge_direction_t direction[2];

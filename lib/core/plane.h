@@ -47,8 +47,8 @@ bool oc_plane_is_ground(const double ground_from_image[9], double x_px, double y
 
 /* Where a pixel's ray meets the ground, metres. OC_E_DEGENERATE when it does
  * not meet it in front of the camera. */
-OC_CHECKED oc_status_t oc_plane_ground_point(const double ground_from_image[9], double x_px, double y_px,
-                                             double *x_m, double *y_m);
+OC_CHECKED oc_status_t oc_plane_ground_point(const double ground_from_image[9], double x_px, double y_px, double *x_m,
+                                             double *y_m);
 
 /* H_g = H_2 H_1^-1 (thesis Eq 4.32): right pixel of a left pixel of ground.
  * OC_E_DEGENERATE when either camera stands in the ground plane. */
@@ -65,8 +65,8 @@ OC_CHECKED oc_status_t oc_plane_ground_homography(const oc_camera_t *left, const
  *
  * OC_E_DEGENERATE when either camera is in the plane (nearer than 1e-9 of its
  * distances), OC_E_ARG when the plane is not finite. */
-OC_CHECKED oc_status_t oc_plane_homography(const oc_camera_t *left, const oc_camera_t *right,
-                                           const oc_plane_t *plane, double H[9], bool *same_side);
+OC_CHECKED oc_status_t oc_plane_homography(const oc_camera_t *left, const oc_camera_t *right, const oc_plane_t *plane,
+                                           double H[9], bool *same_side);
 
 /* ---- the plane of a junction ---- */
 
@@ -101,8 +101,7 @@ void oc_edge_prepare(const oc_camera_t *camera, const oc_edge2_t *edge, oc_edge3
 
 /* Direction of the edge in space, n x n' (thesis Eq 5.26, the factors).
  * OC_E_DEGENERATE below OC_EDGE_MIN_SINE. About 40 flops. */
-OC_CHECKED oc_status_t oc_edge_direction(const oc_edge3_t *left, const oc_edge3_t *right,
-                                         oc_edge_direction_t *out);
+OC_CHECKED oc_status_t oc_edge_direction(const oc_edge3_t *left, const oc_edge3_t *right, oc_edge_direction_t *out);
 
 /* Plane through a point along two directions: n = d1 x d2 / |.|, d = -n . M
  * (thesis Eq 5.26-5.29). OC_E_DEGENERATE when the directions are parallel

@@ -20,9 +20,8 @@ oc_status_t oc_similarity_from_points(double x0_px, double y0_px, double x1_px, 
     const double length = hypot(x1_px - x0_px, y1_px - y0_px);
     if (!isfinite(length) || !isfinite(d_m) || !(d_m > 0.0)) return OC_E_ARG;
     if (!(length > 0.0)) return OC_E_DEGENERATE;
-    const oc_similarity_t out = {.scale_px_per_m = length / d_m,
-                                 .theta_rad = atan2(y1_px - y0_px, x1_px - x0_px),
-                                 .t_px = {x0_px, y0_px}};
+    const oc_similarity_t out = {
+        .scale_px_per_m = length / d_m, .theta_rad = atan2(y1_px - y0_px, x1_px - x0_px), .t_px = {x0_px, y0_px}};
     *map_from_world = out;
     return OC_OK;
 }

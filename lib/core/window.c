@@ -38,8 +38,7 @@ static oc_status_t window_from_transfer(const transfer_t *t, double sigma_px, oc
     const double det = xx * yy - xy * xy;
     if (!(det > 0.0) || !isfinite(det)) return OC_E_DEGENERATE;
 
-    const oc_window_t out = {
-        .x_px = x, .y_px = y, .cov_px2 = {xx, xy, yy}, .info = {yy / det, -xy / det, xx / det}};
+    const oc_window_t out = {.x_px = x, .y_px = y, .cov_px2 = {xx, xy, yy}, .info = {yy / det, -xy / det, xx / det}};
     *window = out;
     return OC_OK;
 }
@@ -172,8 +171,7 @@ static double end_slack_px(const oc_pair_t *pair, double x_px, double y_px, doub
     oc_window_t w;
     if (oc_window_at_height(pair, x_px, y_px, z_m, &w) != OC_OK) return 0.0;
     const double *c = w.cov_px2;
-    const double variance =
-        along[0] * (along[0] * c[0] + 2.0 * along[1] * c[1]) + along[1] * along[1] * c[2];
+    const double variance = along[0] * (along[0] * c[0] + 2.0 * along[1] * c[1]) + along[1] * along[1] * c[2];
     return OC_STRIP_MAX_SIGMA * sqrt(variance);
 }
 

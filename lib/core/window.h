@@ -45,10 +45,10 @@ typedef enum oc_angle_error {
 typedef struct oc_pair {
     oc_camera_t left, right;
     double sigma_px;
-    double F[9];    /* unit norm */
-    double H[9];    /* of the ground */
+    double F[9]; /* unit norm */
+    double H[9]; /* of the ground */
     double H_inf[9];
-    double B[9];    /* H of the plane Z = z is H_inf - B / (left height - z) */
+    double B[9]; /* H of the plane Z = z is H_inf - B / (left height - z) */
     double left_height_m;
     /* d / d parameter, times the parameter's standard deviation a / sqrt 3 */
     double dF[OC_PAIR_PARAMS][9];
@@ -56,10 +56,10 @@ typedef struct oc_pair {
     double dH_inf[OC_PAIR_PARAMS][9];
     double dB[OC_PAIR_PARAMS][9];
     double d_left_height_m[OC_PAIR_PARAMS];
-    double left_ray[9];      /* M^-1: pixel -> direction with depth 1 */
+    double left_ray[9]; /* M^-1: pixel -> direction with depth 1 */
     double left_centre_m[3];
-    double right_M[9];       /* M' = K' R' */
-    double e_right[3];       /* M' (C - C') */
+    double right_M[9]; /* M' = K' R' */
+    double e_right[3]; /* M' (C - C') */
 } oc_pair_t;
 
 /* Prepare a pair: F, the ground homography and their derivatives by central
@@ -81,9 +81,9 @@ OC_CHECKED oc_status_t oc_pair_prepare(oc_pair_t *pair, const oc_camera_t *left,
 
 /* An ellipse in the right view. */
 typedef struct oc_window {
-    double x_px, y_px;   /* its centre, the transfer of the left pixel */
-    double cov_px2[3];   /* xx, xy, yy */
-    double info[3];      /* inverse of it, xx, xy, yy */
+    double x_px, y_px; /* its centre, the transfer of the left pixel */
+    double cov_px2[3]; /* xx, xy, yy */
+    double info[3];    /* inverse of it, xx, xy, yy */
 } oc_window_t;
 
 /* Window of a left pixel if it is on the ground: Sigma = J diag(a^2/3) J^T +
@@ -123,9 +123,9 @@ double oc_window_area_px2(const oc_window_t *window);
 /* A band round the epipolar line; its half-width is OC_STRIP_MAX_SIGMA * sigma
  * and changes along the line. */
 typedef struct oc_strip {
-    double line[3];     /* a^2 + b^2 = 1 */
-    double q[6];        /* sigma^2 at m' = m'^T Q m'; Q = xx xy x1 yy y1 11 (poses and left pixel) */
-    double sigma_px;    /* of the right pixel, to be added */
+    double line[3];  /* a^2 + b^2 = 1 */
+    double q[6];     /* sigma^2 at m' = m'^T Q m'; Q = xx xy x1 yy y1 11 (poses and left pixel) */
+    double sigma_px; /* of the right pixel, to be added */
 } oc_strip_t;
 
 /* OC_E_DEGENERATE when the pixel is the epipole (nearer than 1e-6 px),
@@ -140,8 +140,8 @@ static inline double oc_strip_distance_px(const oc_strip_t *s, double x_px, doub
 /* Variance of that distance, px^2. */
 static inline double oc_strip_variance_px2(const oc_strip_t *s, double x_px, double y_px)
 {
-    const double q = x_px * (s->q[0] * x_px + 2.0 * (s->q[1] * y_px + s->q[2])) +
-                     y_px * (s->q[3] * y_px + 2.0 * s->q[4]) + s->q[5];
+    const double q =
+        x_px * (s->q[0] * x_px + 2.0 * (s->q[1] * y_px + s->q[2])) + y_px * (s->q[3] * y_px + 2.0 * s->q[4]) + s->q[5];
     return q + s->sigma_px * s->sigma_px;
 }
 
@@ -213,8 +213,8 @@ OC_CHECKED oc_status_t oc_window_ground_thesis(const oc_pair_thesis_t *pair, dou
 /* Thesis Eq 5.9-5.14: lines through the smallest and largest crossings with the
  * image's left border x = 0 and right border x = width. OC_E_DEGENERATE when a
  * moved line is vertical, which Eq 5.13 divides by. */
-OC_CHECKED oc_status_t oc_strip_prepare_thesis(const oc_pair_thesis_t *pair, double x_px, double y_px,
-                                               double width_px, oc_strip_thesis_t *strip);
+OC_CHECKED oc_status_t oc_strip_prepare_thesis(const oc_pair_thesis_t *pair, double x_px, double y_px, double width_px,
+                                               oc_strip_thesis_t *strip);
 
 /* Thesis Eq 5.15, 5.16: between the edges, (l_u . m') (l_d . m') < 0. */
 bool oc_strip_contains_thesis(const oc_strip_thesis_t *strip, double x_px, double y_px);

@@ -13,57 +13,64 @@ namespace {
 constexpr std::size_t kHeadBytes = 4, kCrcBytes = 2;
 
 // Without the head, whose sequence number differs between a packet and its resend, and the CRC over it.
-std::vector<std::uint8_t> body_of(const std::vector<std::uint8_t> &datagram) {
+std::vector<std::uint8_t> body_of(const std::vector<std::uint8_t> &datagram)
+{
     return {datagram.begin() + kHeadBytes, datagram.end() - kCrcBytes};
 }
 
 constexpr int kMaskParts = 32;
 
-}  // namespace
+} // namespace
 
-bool TileKey::operator<(const TileKey &o) const {
+bool TileKey::operator<(const TileKey &o) const
+{
     return std::tie(view, ix, iy, tile_px, metres_per_pixel) <
            std::tie(o.view, o.ix, o.iy, o.tile_px, o.metres_per_pixel);
 }
 
-bool PacketAssembler::Relabel::operator<(const Relabel &o) const {
+bool PacketAssembler::Relabel::operator<(const Relabel &o) const
+{
     return std::tie(sequence, first, labels) < std::tie(o.sequence, o.first, o.labels);
 }
 
 PacketAssembler::PacketAssembler(const AssembleOptions &options) : options_(options) {}
 
-FeedResult PacketAssembler::feed(const std::uint8_t *bytes, std::size_t n_bytes) {
+FeedResult PacketAssembler::feed(const std::uint8_t *bytes, std::size_t n_bytes)
+{
     const FeedResult result = dispatch(bytes, n_bytes);
     ++counts_[static_cast<std::size_t>(result)];
     return result;
 }
 
-FeedResult PacketAssembler::dispatch(const std::uint8_t *bytes, std::size_t n_bytes) {
+FeedResult PacketAssembler::dispatch(const std::uint8_t *bytes, std::size_t n_bytes)
+{
     oc_packet_head_t head;
     if (bytes == nullptr || oc_packet_decode_head(bytes, n_bytes, &head) != OC_OK) return FeedResult::kIllFormed;
     if (n_bytes < kHeadBytes + kCrcBytes) return FeedResult::kIllFormed;
     if (options_.vehicle >= 0 && head.vehicle != options_.vehicle) return FeedResult::kForeign;
     const Bytes datagram(bytes, bytes + n_bytes);
     switch (head.type) {
-        case OC_PACKET_VIEW: return take_view(head, datagram);
-        case OC_PACKET_RELABEL: return take_relabel(head, datagram);
-        case OC_PACKET_PATCH: return take_patch(datagram);
-        case OC_PACKET_OVERHEAD: return take_overhead(datagram);
-        case OC_PACKET_STATUS: return take_status(head, datagram);
-        case OC_PACKET_ANNOUNCE: return take_announce(datagram);
-        default: return FeedResult::kOther;
+    case OC_PACKET_VIEW: return take_view(head, datagram);
+    case OC_PACKET_RELABEL: return take_relabel(head, datagram);
+    case OC_PACKET_PATCH: return take_patch(datagram);
+    case OC_PACKET_OVERHEAD: return take_overhead(datagram);
+    case OC_PACKET_STATUS: return take_status(head, datagram);
+    case OC_PACKET_ANNOUNCE: return take_announce(datagram);
+    default: return FeedResult::kOther;
     }
 }
 
 // Of a view, made when it is new; nullptr when there is no room.
-PacketAssembler::Entry *PacketAssembler::entry(int view) {
+PacketAssembler::Entry *PacketAssembler::entry(int view)
+{
     const auto known = entries_.find(view);
     if (known != entries_.end()) return &known->second;
     if (entries_.size() >= options_.max_views) return nullptr;
     return &entries_[view];
 }
 
-FeedResult PacketAssembler::take_view(const oc_packet_head_t &head, const Bytes &datagram) {
+FeedResult PacketAssembler::take_view(const oc_packet_head_t &head, const Bytes &datagram)
+{
     const auto part = std::make_unique<oc_view_part_t>();
     if (oc_packet_decode_view(datagram.data(), datagram.size(), part.get()) != OC_OK) return FeedResult::kIllFormed;
     Entry *view = entry(part->head.view);
@@ -90,7 +97,8 @@ FeedResult PacketAssembler::take_view(const oc_packet_head_t &head, const Bytes 
     return FeedResult::kTaken;
 }
 
-FeedResult PacketAssembler::take_relabel(const oc_packet_head_t &head, const Bytes &datagram) {
+FeedResult PacketAssembler::take_relabel(const oc_packet_head_t &head, const Bytes &datagram)
+{
     const auto relabel = std::make_unique<oc_relabel_t>();
     if (oc_packet_decode_relabel(datagram.data(), datagram.size(), relabel.get()) != OC_OK)
         return FeedResult::kIllFormed;
@@ -104,7 +112,8 @@ FeedResult PacketAssembler::take_relabel(const oc_packet_head_t &head, const Byt
     return FeedResult::kTaken;
 }
 
-FeedResult PacketAssembler::take_patch(const Bytes &datagram) {
+FeedResult PacketAssembler::take_patch(const Bytes &datagram)
+{
     const auto patch = std::make_unique<oc_patch_t>();
     if (oc_packet_decode_patch(datagram.data(), datagram.size(), patch.get()) != OC_OK) return FeedResult::kIllFormed;
     Entry *view = entry(patch->view);
@@ -129,7 +138,8 @@ FeedResult PacketAssembler::take_patch(const Bytes &datagram) {
     return result;
 }
 
-FeedResult PacketAssembler::take_overhead(const Bytes &datagram) {
+FeedResult PacketAssembler::take_overhead(const Bytes &datagram)
+{
     oc_overhead_t tile;
     if (oc_packet_decode_overhead(datagram.data(), datagram.size(), &tile) != OC_OK) return FeedResult::kIllFormed;
     const TileKey key{tile.view, tile.tile.ix, tile.tile.iy, tile.tile_px, tile.metres_per_pixel};
@@ -149,7 +159,8 @@ FeedResult PacketAssembler::take_overhead(const Bytes &datagram) {
     return FeedResult::kTaken;
 }
 
-FeedResult PacketAssembler::take_status(const oc_packet_head_t &head, const Bytes &datagram) {
+FeedResult PacketAssembler::take_status(const oc_packet_head_t &head, const Bytes &datagram)
+{
     oc_vehicle_status_t status;
     if (oc_packet_decode_status(datagram.data(), datagram.size(), &status) != OC_OK) return FeedResult::kIllFormed;
     if (status_ && std::tie(status.uptime_s, head.sequence) <= std::tie(status_->uptime_s, status_sequence_))
@@ -159,10 +170,10 @@ FeedResult PacketAssembler::take_status(const oc_packet_head_t &head, const Byte
     return FeedResult::kTaken;
 }
 
-FeedResult PacketAssembler::take_announce(const Bytes &datagram) {
+FeedResult PacketAssembler::take_announce(const Bytes &datagram)
+{
     oc_announce_t announce;
-    if (oc_packet_decode_announce(datagram.data(), datagram.size(), &announce) != OC_OK)
-        return FeedResult::kIllFormed;
+    if (oc_packet_decode_announce(datagram.data(), datagram.size(), &announce) != OC_OK) return FeedResult::kIllFormed;
     const auto known = announced_.find(announce.view);
     if (known != announced_.end() && known->second >= announce.utime_us) return FeedResult::kKnown;
     announced_[announce.view] = announce.utime_us;
@@ -170,14 +181,16 @@ FeedResult PacketAssembler::take_announce(const Bytes &datagram) {
 }
 
 // Number of the part that says it is the last (the least, should several say so), or -1.
-int PacketAssembler::last_part(const Entry &entry) {
+int PacketAssembler::last_part(const Entry &entry)
+{
     for (const auto &[number, part] : entry.parts)
         if (part.head.is_last) return number;
     return -1;
 }
 
 // All parts are there and their junctions follow on each other.
-bool PacketAssembler::is_complete(const Entry &entry) {
+bool PacketAssembler::is_complete(const Entry &entry)
+{
     const int last = last_part(entry);
     if (last < 0 || static_cast<int>(entry.parts.size()) <= last) return false;
     std::size_t n = 0;
@@ -192,7 +205,8 @@ bool PacketAssembler::is_complete(const Entry &entry) {
 
 namespace {
 
-void paint_block(std::uint16_t index, const std::array<std::uint8_t, OC_BLOCK_PX * OC_BLOCK_PX> &px, View *view) {
+void paint_block(std::uint16_t index, const std::array<std::uint8_t, OC_BLOCK_PX * OC_BLOCK_PX> &px, View *view)
+{
     const int side = static_cast<int>(OC_BLOCK_PX);
     const int per_row = (view->grey.cols + side - 1) / side;
     const int x0 = index % per_row * side, y0 = index / per_row * side;
@@ -204,9 +218,10 @@ void paint_block(std::uint16_t index, const std::array<std::uint8_t, OC_BLOCK_PX
     }
 }
 
-}  // namespace
+} // namespace
 
-View PacketAssembler::build(int id, const Entry &entry) {
+View PacketAssembler::build(int id, const Entry &entry)
+{
     const Part &first = entry.parts.begin()->second;
     View view;
     view.id = id;
@@ -227,8 +242,7 @@ View PacketAssembler::build(int id, const Entry &entry) {
     std::vector<std::pair<std::uint16_t, const Relabel *>> relabels;
     for (const Relabel &r : entry.relabels)
         relabels.emplace_back(static_cast<std::uint16_t>(r.sequence - first.sequence), &r);
-    std::stable_sort(relabels.begin(), relabels.end(),
-                     [](const auto &a, const auto &b) { return a.first < b.first; });
+    std::stable_sort(relabels.begin(), relabels.end(), [](const auto &a, const auto &b) { return a.first < b.first; });
     for (const auto &[age, relabel] : relabels)
         for (std::size_t i = 0; i < relabel->labels.size() && relabel->first + i < view.junctions.size(); ++i)
             view.junctions[relabel->first + i].label = relabel->labels[i];
@@ -239,20 +253,22 @@ View PacketAssembler::build(int id, const Entry &entry) {
     return view;
 }
 
-const std::map<int, View> &PacketAssembler::views() {
+const std::map<int, View> &PacketAssembler::views()
+{
     for (auto &[id, entry] : entries_) {
         if (!entry.is_dirty) continue;
         entry.is_dirty = false;
         if (is_complete(entry)) {
             views_[id] = build(id, entry);
         } else {
-            views_.erase(id);  // a newer one of the same id has begun
+            views_.erase(id); // a newer one of the same id has begun
         }
     }
     return views_;
 }
 
-std::map<int, std::uint32_t> PacketAssembler::missing() const {
+std::map<int, std::uint32_t> PacketAssembler::missing() const
+{
     constexpr std::uint32_t kAll = 0xffffffffu;
     std::map<int, std::uint32_t> missing;
     for (const auto &[id, entry] : entries_) {
@@ -282,4 +298,4 @@ std::map<int, std::uint32_t> PacketAssembler::missing() const {
     return missing;
 }
 
-}  // namespace outcrop
+} // namespace outcrop

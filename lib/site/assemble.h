@@ -16,20 +16,20 @@
 namespace outcrop {
 
 struct AssembleOptions {
-    int vehicle = -1;                      // take packets of this vehicle only; -1: of any (one vehicle per assembler)
-    std::size_t max_views = 4096;          // views, complete or not, and views known from relabels and patches only
-    std::size_t max_blocks = 1u << 20;     // pixel blocks in all, 64 bytes each
-    std::size_t max_relabels = 256;        // kept per view
-    std::size_t max_tiles = 1u << 16;      // overhead tiles in all, a datagram each
+    int vehicle = -1;                  // take packets of this vehicle only; -1: of any (one vehicle per assembler)
+    std::size_t max_views = 4096;      // views, complete or not, and views known from relabels and patches only
+    std::size_t max_blocks = 1u << 20; // pixel blocks in all, 64 bytes each
+    std::size_t max_relabels = 256;    // kept per view
+    std::size_t max_tiles = 1u << 16;  // overhead tiles in all, a datagram each
 };
 
 enum class FeedResult {
-    kTaken,      // new, the state may have changed
-    kKnown,      // duplicate, or worse than what is there
-    kForeign,    // of another vehicle
-    kIllFormed,  // does not decode
-    kOther,      // a type that is not assembled here (image pieces, uplink)
-    kFull        // a bound was hit
+    kTaken,     // new, the state may have changed
+    kKnown,     // duplicate, or worse than what is there
+    kForeign,   // of another vehicle
+    kIllFormed, // does not decode
+    kOther,     // a type that is not assembled here (image pieces, uplink)
+    kFull       // a bound was hit
 };
 
 // One overhead tile as it came; decoding the pixels is the overhead module's.
@@ -41,7 +41,7 @@ struct TileKey {
     bool operator<(const TileKey &o) const;
 };
 struct TileBlob {
-    std::uint8_t codec = 0;  // oc_codec_t
+    std::uint8_t codec = 0; // oc_codec_t
     std::vector<std::uint8_t> bytes;
 };
 
@@ -73,7 +73,7 @@ public:
 
     const std::map<TileKey, TileBlob> &tiles() const { return tiles_; }
     const std::optional<oc_vehicle_status_t> &status() const { return status_; }
-    const std::map<int, std::int64_t> &announced() const { return announced_; }  // view id -> utime_us
+    const std::map<int, std::int64_t> &announced() const { return announced_; } // view id -> utime_us
 
     std::uint64_t count(FeedResult result) const { return counts_[static_cast<std::size_t>(result)]; }
     // Parts that came for a view but belong to an older one of the same id.
@@ -100,7 +100,7 @@ private:
     };
     struct Entry {
         std::int64_t utime_us = 0;
-        std::map<int, Part> parts;  // of that capture time only
+        std::map<int, Part> parts; // of that capture time only
         std::set<Relabel> relabels;
         std::map<std::uint16_t, Block> blocks;
         bool is_dirty = true;
@@ -130,4 +130,4 @@ private:
     std::uint64_t outdated_parts_ = 0;
 };
 
-}  // namespace outcrop
+} // namespace outcrop

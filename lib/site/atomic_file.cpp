@@ -13,12 +13,15 @@ namespace outcrop {
 void write_whole(const std::string &path, const void *bytes, std::size_t n_bytes)
 {
     const std::string part = path + ".part";
+    bool is_written = false;
     {
         std::ofstream file(part, std::ios::binary);
         file.write(static_cast<const char *>(bytes), static_cast<std::streamsize>(n_bytes));
-        if (!file.flush()) throw std::runtime_error(path + ": cannot be written");
+        is_written = static_cast<bool>(file.flush());
     }
-    if (std::rename(part.c_str(), path.c_str()) != 0) throw std::runtime_error(path + ": cannot be written");
+    if (is_written && std::rename(part.c_str(), path.c_str()) == 0) return;
+    std::remove(part.c_str());
+    throw std::runtime_error(path + ": cannot be written");
 }
 
 void write_whole(const std::string &path, const std::string &text)
@@ -34,4 +37,4 @@ void write_png(const std::string &path, const cv::Mat &image)
     write_whole(path, bytes.data(), bytes.size());
 }
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -16,4 +16,4 @@ void write_whole(const std::string &path, const std::string &text);
 // A PNG, the channels in OpenCV's order (grey, BGR or BGRA).
 void write_png(const std::string &path, const cv::Mat &image);
 
-}  // namespace outcrop
+} // namespace outcrop

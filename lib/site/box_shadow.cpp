@@ -54,4 +54,4 @@ bool is_hidden(const std::vector<Blocker> &blockers, const Eigen::Vector3d &from
                        [&](const Blocker &blocker) { return blocker.meets(from, to); });
 }
 
-}  // namespace outcrop
+} // namespace outcrop

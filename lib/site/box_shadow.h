@@ -32,4 +32,4 @@ std::vector<Blocker> blockers_of(const SiteModel &model, double grow_share);
 
 bool is_hidden(const std::vector<Blocker> &blockers, const Eigen::Vector3d &from, const Eigen::Vector3d &to);
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -18,16 +18,23 @@ using Eigen::Vector3d;
 
 constexpr double kPi = 3.14159265358979323846;
 
-double cross(const Vector2d &a, const Vector2d &b) { return a.x() * b.y() - a.y() * b.x(); }
+double cross(const Vector2d &a, const Vector2d &b)
+{
+    return a.x() * b.y() - a.y() * b.x();
+}
 
 // Into (-pi/2, pi/2]; a box turned by half a turn is the same box.
-double fold_yaw(double yaw) {
+double fold_yaw(double yaw)
+{
     while (yaw > kPi / 2) yaw -= kPi;
     while (yaw <= -kPi / 2) yaw += kPi;
     return yaw;
 }
 
-Vector2d direction(double yaw) { return {std::cos(yaw), std::sin(yaw)}; }
+Vector2d direction(double yaw)
+{
+    return {std::cos(yaw), std::sin(yaw)};
+}
 
 struct Extent {
     double low = 0, high = 0;
@@ -39,7 +46,8 @@ struct Value {
 
 // Outermost values without stragglers: from each end, at most trim_share of the values (at least one of ten) leave as
 // long as each widens the extent of the rest by more than trim_gap. Then widened by the outermost value's sigma.
-Extent robust_extent(std::vector<Value> values, const BoxOptions &options) {
+Extent robust_extent(std::vector<Value> values, const BoxOptions &options)
+{
     std::sort(values.begin(), values.end(),
               [](const Value &a, const Value &b) { return std::tie(a.at, a.sigma) < std::tie(b.at, b.sigma); });
     std::size_t first = 0, last = values.size() - 1;
@@ -55,12 +63,17 @@ Extent robust_extent(std::vector<Value> values, const BoxOptions &options) {
         if (!(values[last].at - values[last - 1].at > options.trim_gap * rest)) break;
         --last;
     }
-    return {values[first].at - options.widen_sigmas * values[first].sigma,
-            values[last].at + options.widen_sigmas * values[last].sigma};
+    // What a sample of a body shows stops short of its ends by about one mean gap.
+    const double range = values[last].at - values[first].at;
+    const double gap = last > first ? range / static_cast<double>(last - first) : 0;
+    const double unseen = std::min(options.widen_gaps * gap, options.max_unseen_share * range);
+    return {values[first].at - options.widen_sigmas * values[first].sigma - unseen,
+            values[last].at + options.widen_sigmas * values[last].sigma + unseen};
 }
 
 Extent extent_along(const std::vector<SitePoint> &points, const std::vector<int> &members, const Vector3d &axis,
-                    const BoxOptions &options, double min_size) {
+                    const BoxOptions &options, double min_size)
+{
     std::vector<Value> values;
     for (const int i : members) {
         const SitePoint &p = points[static_cast<std::size_t>(i)];
@@ -73,13 +86,15 @@ Extent extent_along(const std::vector<SitePoint> &points, const std::vector<int>
 }
 
 // Distance of each member to its second nearest neighbour. O(n^2).
-std::vector<double> second_distances(const std::vector<SitePoint> &points, const std::vector<int> &members) {
+std::vector<double> second_distances(const std::vector<SitePoint> &points, const std::vector<int> &members)
+{
     std::vector<double> distances;
     for (const int i : members) {
         double nearest = std::numeric_limits<double>::infinity(), second = nearest;
         for (const int j : members) {
             if (i == j) continue;
-            const double d = (points[static_cast<std::size_t>(i)].position - points[static_cast<std::size_t>(j)].position).norm();
+            const Vector3d &here = points[static_cast<std::size_t>(i)].position;
+            const double d = (here - points[static_cast<std::size_t>(j)].position).norm();
             if (d < nearest) {
                 second = nearest, nearest = d;
             } else {
@@ -93,21 +108,24 @@ std::vector<double> second_distances(const std::vector<SitePoint> &points, const
 
 // Without weak points that stand alone: what two views only agree on is wrong now and then.
 std::vector<int> trusted(const std::vector<SitePoint> &points, const std::vector<int> &members,
-                         const BoxOptions &options) {
+                         const BoxOptions &options)
+{
     if (!(options.isolation > 0) || static_cast<int>(members.size()) < options.min_isolation_points) return members;
     const std::vector<double> distances = second_distances(points, members);
     std::vector<double> sorted = distances;
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
+    std::sort(sorted.begin(), sorted.end());
     const double limit = options.isolation * sorted[sorted.size() / 2];
     std::vector<int> kept;
     for (std::size_t i = 0; i < members.size(); ++i)
-        if (points[static_cast<std::size_t>(members[i])].n_views > 2 || distances[i] <= limit) kept.push_back(members[i]);
+        if (points[static_cast<std::size_t>(members[i])].n_views > 2 || distances[i] <= limit)
+            kept.push_back(members[i]);
     return kept.size() * 2 >= members.size() ? kept : members;
 }
 
 // Points that lie within the trimmed extents along X and Y.
 std::vector<Vector2d> inner_points(const std::vector<SitePoint> &points, const std::vector<int> &members,
-                                   const Extent &x, const Extent &y) {
+                                   const Extent &x, const Extent &y)
+{
     std::vector<Vector2d> inner;
     for (const int i : members) {
         const Vector3d &p = points[static_cast<std::size_t>(i)].position;
@@ -116,11 +134,14 @@ std::vector<Vector2d> inner_points(const std::vector<SitePoint> &points, const s
     return inner;
 }
 
-}  // namespace
+} // namespace
 
-void BoxOptions::check() const {
+void BoxOptions::check() const
+{
     if (!(trim_share >= 0) || !(trim_share < 0.5) || !(trim_gap > 0) || !(widen_sigmas >= 0))
         throw std::invalid_argument("boxes: trim_share in [0, 0.5), trim_gap > 0, widen_sigmas >= 0");
+    if (!(widen_gaps >= 0) || !(max_unseen_share >= 0))
+        throw std::invalid_argument("boxes: widen_gaps and max_unseen_share must be >= 0");
     if (!(isolation >= 0) || min_isolation_points < 3)
         throw std::invalid_argument("boxes: isolation must be >= 0, min_isolation_points >= 3");
     if (!(min_size_m >= 0) || !(min_size_share >= 0) || !(merge_overlap > 0))
@@ -128,7 +149,8 @@ void BoxOptions::check() const {
 }
 
 // Andrew's monotone chain.
-std::vector<Vector2d> convex_hull(std::vector<Vector2d> points) {
+std::vector<Vector2d> convex_hull(std::vector<Vector2d> points)
+{
     const auto less = [](const Vector2d &a, const Vector2d &b) {
         return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
     };
@@ -147,7 +169,8 @@ std::vector<Vector2d> convex_hull(std::vector<Vector2d> points) {
     return hull;
 }
 
-Rectangle min_area_rectangle(const std::vector<Vector2d> &points) {
+Rectangle min_area_rectangle(const std::vector<Vector2d> &points)
+{
     const std::vector<Vector2d> hull = convex_hull(points);
     Rectangle best;
     if (hull.empty()) return best;
@@ -176,7 +199,8 @@ Rectangle min_area_rectangle(const std::vector<Vector2d> &points) {
 }
 
 Obstacle fit_box(const std::vector<SitePoint> &points, const std::vector<int> &group, double diagonal_m,
-                 const BoxOptions &options) {
+                 const BoxOptions &options)
+{
     if (group.empty()) throw std::invalid_argument("boxes: a box needs points");
     const std::vector<int> members = trusted(points, group, options);
     const double min_size = options.min_size_m > 0 ? options.min_size_m : options.min_size_share * diagonal_m;
@@ -199,14 +223,16 @@ Obstacle fit_box(const std::vector<SitePoint> &points, const std::vector<int> &g
     return box;
 }
 
-bool footprint_contains(const Obstacle &box, double x, double y, double grow_m) {
+bool footprint_contains(const Obstacle &box, double x, double y, double grow_m)
+{
     const Vector2d along = direction(box.yaw_rad), across(-along.y(), along.x());
     const Vector2d off(x - box.obb_centre.x(), y - box.obb_centre.y());
     return std::abs(along.dot(off)) <= box.obb_size.x() / 2 + grow_m &&
            std::abs(across.dot(off)) <= box.obb_size.y() / 2 + grow_m;
 }
 
-double aabb_iou(const Vector3d &min_a, const Vector3d &max_a, const Vector3d &min_b, const Vector3d &max_b) {
+double aabb_iou(const Vector3d &min_a, const Vector3d &max_a, const Vector3d &min_b, const Vector3d &max_b)
+{
     const Vector3d both = (max_a.cwiseMin(max_b) - min_a.cwiseMax(min_b)).cwiseMax(0.0);
     const double shared = both.prod();
     const double all = (max_a - min_a).prod() + (max_b - min_b).prod() - shared;
@@ -215,21 +241,24 @@ double aabb_iou(const Vector3d &min_a, const Vector3d &max_a, const Vector3d &mi
 
 namespace {
 
-std::vector<Vector2d> corners(const Obstacle &box) {
+std::vector<Vector2d> corners(const Obstacle &box)
+{
     const Vector2d along = direction(box.yaw_rad), across(-along.y(), along.x());
     const Vector2d centre = box.obb_centre.head<2>();
     const Vector2d a = box.obb_size.x() / 2 * along, b = box.obb_size.y() / 2 * across;
     return {centre - a - b, centre + a - b, centre + a + b, centre - a + b};
 }
 
-double polygon_area(const std::vector<Vector2d> &p) {
+double polygon_area(const std::vector<Vector2d> &p)
+{
     double twice = 0;
     for (std::size_t i = 0; i < p.size(); ++i) twice += cross(p[i], p[(i + 1) % p.size()]);
     return twice / 2;
 }
 
 // Sutherland-Hodgman, both counter-clockwise.
-double shared_footprint(const Obstacle &a, const Obstacle &b) {
+double shared_footprint(const Obstacle &a, const Obstacle &b)
+{
     std::vector<Vector2d> polygon = corners(a);
     const std::vector<Vector2d> clip = corners(b);
     for (std::size_t e = 0; e < clip.size() && !polygon.empty(); ++e) {
@@ -246,7 +275,10 @@ double shared_footprint(const Obstacle &a, const Obstacle &b) {
     return polygon.size() < 3 ? 0 : polygon_area(polygon);
 }
 
-double footprint_area(const Obstacle &box) { return box.obb_size.x() * box.obb_size.y(); }
+double footprint_area(const Obstacle &box)
+{
+    return box.obb_size.x() * box.obb_size.y();
+}
 
 struct Boxed {
     std::vector<int> members;
@@ -255,7 +287,8 @@ struct Boxed {
 
 // Joins the first two that overlap, until none do.
 void merge_overlapping(const std::vector<SitePoint> &points, double diagonal_m, const BoxOptions &options,
-                       std::vector<Boxed> *boxes) {
+                       std::vector<Boxed> *boxes)
+{
     for (std::size_t i = 0; i < boxes->size(); ++i) {
         for (std::size_t j = i + 1; j < boxes->size(); ++j) {
             Boxed &a = (*boxes)[i], &b = (*boxes)[j];
@@ -265,21 +298,24 @@ void merge_overlapping(const std::vector<SitePoint> &points, double diagonal_m, 
             std::sort(a.members.begin(), a.members.end());
             a.box = fit_box(points, a.members, diagonal_m, options);
             boxes->erase(boxes->begin() + static_cast<std::ptrdiff_t>(j));
-            i = static_cast<std::size_t>(-1);  // from the start: the grown box may reach others
+            i = static_cast<std::size_t>(-1); // from the start: the grown box may reach others
             break;
         }
     }
 }
 
 std::vector<Boxed> boxed(const std::vector<std::vector<int>> &groups, const std::vector<SitePoint> &points,
-                         double diagonal_m, const BoxOptions &options) {
+                         double diagonal_m, const BoxOptions &options)
+{
     std::vector<Boxed> boxes;
-    for (const std::vector<int> &members : groups) boxes.push_back({members, fit_box(points, members, diagonal_m, options)});
+    for (const std::vector<int> &members : groups)
+        boxes.push_back({members, fit_box(points, members, diagonal_m, options)});
     return boxes;
 }
 
 // Groups whose centre stands in a box already belong to it; the box does not grow for them.
-void absorb(const std::vector<Boxed> &boxes, std::vector<Boxed> *small, std::vector<SitePoint> *points) {
+void absorb(const std::vector<Boxed> &boxes, std::vector<Boxed> *small, std::vector<SitePoint> *points)
+{
     std::vector<Boxed> left;
     for (Boxed &s : *small) {
         int home = -1;
@@ -292,7 +328,8 @@ void absorb(const std::vector<Boxed> &boxes, std::vector<Boxed> *small, std::vec
     *small = std::move(left);
 }
 
-void number(bool is_suspected, std::vector<Boxed> *boxes, std::vector<Obstacle> *out) {
+void number(bool is_suspected, std::vector<Boxed> *boxes, std::vector<Obstacle> *out)
+{
     std::sort(boxes->begin(), boxes->end(), [](const Boxed &a, const Boxed &b) {
         return std::tuple(-a.box.n_points, a.box.obb_centre.x(), a.box.obb_centre.y(), a.members) <
                std::tuple(-b.box.n_points, b.box.obb_centre.x(), b.box.obb_centre.y(), b.members);
@@ -305,20 +342,22 @@ void number(bool is_suspected, std::vector<Boxed> *boxes, std::vector<Obstacle> 
     }
 }
 
-}  // namespace
+} // namespace
 
 void make_boxes(const Clusters &clusters, double diagonal_m, const BoxOptions &options, std::vector<SitePoint> *points,
-                std::vector<Obstacle> *obstacles, std::vector<Obstacle> *suspected) {
+                std::vector<Obstacle> *obstacles, std::vector<Obstacle> *suspected)
+{
     options.check();
     std::vector<Boxed> whole = boxed(clusters.groups, *points, diagonal_m, options);
     merge_overlapping(*points, diagonal_m, options, &whole);
     number(false, &whole, obstacles);
     for (SitePoint &p : *points) p.obstacle = -1;
     for (std::size_t i = 0; i < whole.size(); ++i)
-        for (const int member : whole[i].members) (*points)[static_cast<std::size_t>(member)].obstacle = static_cast<int>(i);
+        for (const int member : whole[i].members)
+            (*points)[static_cast<std::size_t>(member)].obstacle = static_cast<int>(i);
     std::vector<Boxed> small = boxed(clusters.suspected, *points, diagonal_m, options);
     absorb(whole, &small, points);
     number(true, &small, suspected);
 }
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -12,18 +12,21 @@
 namespace outcrop {
 
 struct BoxOptions {
-    // A point seen by two views only, whose second nearest neighbour in its cluster is farther than this many times
-    // the median, has no say in the box; in clusters of at least min_isolation_points. 0: all have.
+    // A point seen by two views only has no say in the box when its second nearest neighbour in the cluster is farther
+    // than this many times the median of such distances; in clusters of at least min_isolation_points. 0: all have.
     double isolation = 3.0;
     int min_isolation_points = 8;
-    double trim_share = 0.02;     // of the points may lie outside at each end ...
-    double trim_gap = 0.25;       // ... but only while each widens the extent by more than this share
-    double widen_sigmas = 1.0;    // of the outermost points, on every side but the ground's
-    double min_size_m = 0;        // least side; 0: min_size_share of the diagonal
+    double trim_share = 0.02;  // of the points may lie outside at each end ...
+    double trim_gap = 0.9;     // ... but only while each widens the extent of the rest by more than this share
+    double widen_sigmas = 1.0; // of the outermost points, on every side but the ground's
+    double widen_gaps = 1.0;   // mean gaps between the points along a side that the body goes on beyond the outermost:
+                               // the unbiased end of a uniform sample; 0: thesis
+    double max_unseen_share = 0.12; // of the extent, at each end, for clusters of few points
+    double min_size_m = 0;          // least side; 0: min_size_share of the diagonal
     double min_size_share = 0.004;
-    double merge_overlap = 0.15;  // of the smaller footprint: two boxes that share more are one
-    bool down_to_ground = true;   // false: thesis, the points' own least Z
-    void check() const;           // throws std::invalid_argument
+    double merge_overlap = 0.15; // of the smaller footprint: two boxes that share more are one
+    bool down_to_ground = true;  // false: thesis, the points' own least Z
+    void check() const;          // throws std::invalid_argument
 };
 
 // A rectangle in the plane: centre, size.x along yaw, yaw counter-clockwise from +X in (-pi/2, pi/2].
@@ -55,4 +58,4 @@ bool footprint_contains(const Obstacle &box, double x, double y, double grow_m =
 double aabb_iou(const Eigen::Vector3d &min_a, const Eigen::Vector3d &max_a, const Eigen::Vector3d &min_b,
                 const Eigen::Vector3d &max_b);
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -24,13 +24,15 @@ struct Cloud {
     std::size_t kdtree_get_point_count() const { return points.size(); }
     double kdtree_get_pt(std::size_t i, std::size_t axis) const { return points[i][static_cast<int>(axis)]; }
     template <typename Box>
-    bool kdtree_get_bbox(Box &) const {
+    bool kdtree_get_bbox(Box &) const
+    {
         return false;
     }
 };
 using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Cloud>, Cloud, 3, std::uint32_t>;
 
-std::vector<int> labels_of(DisjointSets *sets, std::size_t n) {
+std::vector<int> labels_of(DisjointSets *sets, std::size_t n)
+{
     std::vector<int> label(n);
     std::map<int, int> number;
     for (std::size_t i = 0; i < n; ++i) {
@@ -42,7 +44,8 @@ std::vector<int> labels_of(DisjointSets *sets, std::size_t n) {
 
 // Two points are joined when is_near says so; looked for within `reach`.
 template <typename IsNear>
-std::vector<int> link(const std::vector<Vector3d> &points, double reach, const IsNear &is_near) {
+std::vector<int> link(const std::vector<Vector3d> &points, double reach, const IsNear &is_near)
+{
     DisjointSets sets(points.size());
     if (points.empty()) return {};
     const Cloud cloud{points};
@@ -61,19 +64,23 @@ std::vector<int> link(const std::vector<Vector3d> &points, double reach, const I
     return labels_of(&sets, points.size());
 }
 
-std::vector<Vector3d> flattened(const std::vector<SitePoint> &points, double z_weight) {
+std::vector<Vector3d> flattened(const std::vector<SitePoint> &points, double z_weight)
+{
     std::vector<Vector3d> flat;
     flat.reserve(points.size());
-    for (const SitePoint &p : points)
-        flat.emplace_back(p.position.x(), p.position.y(), p.position.z() * z_weight);
+    for (const SitePoint &p : points) flat.emplace_back(p.position.x(), p.position.y(), p.position.z() * z_weight);
     return flat;
 }
 
-double spread(const SitePoint &p) { return std::sqrt(std::max(p.covariance(0, 0), p.covariance(1, 1))); }
+double spread(const SitePoint &p)
+{
+    return std::sqrt(std::max(p.covariance(0, 0), p.covariance(1, 1)));
+}
 
-}  // namespace
+} // namespace
 
-void ClusterOptions::check() const {
+void ClusterOptions::check() const
+{
     if (!(t_m_m >= 0) || !(min_t_m_share > 0) || !(max_t_m_share >= min_t_m_share) || !(max_t_m_share <= 1))
         throw std::invalid_argument("cluster: t_M must be >= 0, its shares ascending in (0, 1]");
     if (!(z_weight > 0) || !(z_weight <= 1) || min_suspected < 1 || min_points < min_suspected)
@@ -81,13 +88,15 @@ void ClusterOptions::check() const {
     if (!(covariance_sigmas >= 0)) throw std::invalid_argument("cluster: covariance_sigmas must be >= 0");
 }
 
-std::vector<int> single_linkage(const std::vector<Vector3d> &points, double t_m) {
+std::vector<int> single_linkage(const std::vector<Vector3d> &points, double t_m)
+{
     if (!(t_m >= 0)) throw std::invalid_argument("cluster: t_M must be >= 0");
     return link(points, t_m, [t_m](std::size_t, std::size_t, double d) { return d <= t_m; });
 }
 
 // Prim's algorithm on the full graph.
-std::vector<double> spanning_edges(const std::vector<Vector3d> &points) {
+std::vector<double> spanning_edges(const std::vector<Vector3d> &points)
+{
     std::vector<double> edges;
     if (points.size() < 2) return edges;
     std::vector<double> nearest(points.size(), std::numeric_limits<double>::infinity());
@@ -111,7 +120,8 @@ std::vector<double> spanning_edges(const std::vector<Vector3d> &points) {
     return edges;
 }
 
-double automatic_threshold(const std::vector<double> &edges, double lowest, double highest) {
+double automatic_threshold(const std::vector<double> &edges, double lowest, double highest)
+{
     // A gap counts when the next edge is a third longer; below that, edges grow steadily and say nothing.
     constexpr double kClearGap = 1.33;
     double best_ratio = kClearGap, threshold = highest, below = lowest;
@@ -125,7 +135,8 @@ double automatic_threshold(const std::vector<double> &edges, double lowest, doub
     return threshold;
 }
 
-Clusters cluster_points(const std::vector<SitePoint> &points, double diagonal_m, const ClusterOptions &options) {
+Clusters cluster_points(const std::vector<SitePoint> &points, double diagonal_m, const ClusterOptions &options)
+{
     options.check();
     Clusters clusters;
     const std::vector<Vector3d> flat = flattened(points, options.z_weight);
@@ -155,4 +166,4 @@ Clusters cluster_points(const std::vector<SitePoint> &points, double diagonal_m,
     return clusters;
 }
 
-}  // namespace outcrop
+} // namespace outcrop

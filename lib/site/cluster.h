@@ -14,18 +14,18 @@ struct ClusterOptions {
     double t_m_m = 0;            // thesis t_M, metres; 0: from the gap in the edges of the minimum spanning tree
     double min_t_m_share = 0.02; // bounds of the automatic t_M, shares of the area's diagonal
     double max_t_m_share = 0.06;
-    double z_weight = 0.35;      // obstacles stand on the ground: a step up counts less than one sideways; 1: thesis
-    int min_points = 5;          // fewer: suspected
-    int min_suspected = 2;       // fewer: noise
+    double z_weight = 0.35;       // obstacles stand on the ground: a step up counts less than one sideways; 1: thesis
+    int min_points = 5;           // fewer: suspected
+    int min_suspected = 2;        // fewer: noise
     double covariance_sigmas = 0; // distances shrink by so many sigmas of the two points, but not below half; 0: thesis
-    void check() const;          // throws std::invalid_argument
+    void check() const;           // throws std::invalid_argument
 };
 
 struct Clusters {
-    std::vector<int> label;  // per point: 0.. of groups, -1 noise, -2 suspected
-    std::vector<std::vector<int>> groups;     // indices of points, ascending; groups by their least index
-    std::vector<std::vector<int>> suspected;  // alike, smaller than min_points
-    double t_m_m = 0;                         // the threshold in force
+    std::vector<int> label;                  // per point: 0.. of groups, -1 noise, -2 suspected
+    std::vector<std::vector<int>> groups;    // indices of points, ascending; groups by their least index
+    std::vector<std::vector<int>> suspected; // alike, smaller than min_points
+    double t_m_m = 0;                        // the threshold in force
 };
 
 // Single linkage at t_m: two points are together when a chain of steps <= t_m joins them. Labels 0.. in the order
@@ -42,4 +42,4 @@ double automatic_threshold(const std::vector<double> &edges, double lowest, doub
 // diagonal_m: of the working area. Points in world metres.
 Clusters cluster_points(const std::vector<SitePoint> &points, double diagonal_m, const ClusterOptions &options = {});
 
-}  // namespace outcrop
+} // namespace outcrop

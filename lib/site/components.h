@@ -15,7 +15,8 @@ class DisjointSets {
 public:
     explicit DisjointSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0); }
 
-    int root(int i) {
+    int root(int i)
+    {
         while (parent_[at(i)] != i) {
             parent_[at(i)] = parent_[at(parent_[at(i)])];
             i = parent_[at(i)];
@@ -24,7 +25,8 @@ public:
     }
 
     // The root of the joined set.
-    int join(int a, int b) {
+    int join(int a, int b)
+    {
         a = root(a), b = root(b);
         if (b < a) std::swap(a, b);
         parent_[at(b)] = a;
@@ -40,14 +42,16 @@ private:
 class ViewComponents {
 public:
     // view_of: the view of each member.
-    explicit ViewComponents(const std::vector<int> &view_of) : sets_(view_of.size()), views_(view_of.size()) {
+    explicit ViewComponents(const std::vector<int> &view_of) : sets_(view_of.size()), views_(view_of.size())
+    {
         for (std::size_t i = 0; i < view_of.size(); ++i) views_[i].insert(view_of[i]);
     }
 
     int root(int i) { return sets_.root(i); }
 
     // False, and nothing done, when both sides see the same view.
-    bool join(int a, int b) {
+    bool join(int a, int b)
+    {
         a = sets_.root(a), b = sets_.root(b);
         if (a == b) return true;
         std::set<int> &of_a = views_[static_cast<std::size_t>(a)], &of_b = views_[static_cast<std::size_t>(b)];
@@ -65,4 +69,4 @@ private:
     std::vector<std::set<int>> views_;
 };
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -17,10 +17,10 @@ namespace outcrop {
 namespace {
 
 constexpr int kMaxWindow = 31;
-constexpr double kSadFullScale = 64;    // grey levels of mean difference that score 0
+constexpr double kSadFullScale = 64; // grey levels of mean difference that score 0
 constexpr double kTan30 = 0.57735;
-constexpr double kSameWarp = 0.08;      // two planes whose local warps differ by less are one
-constexpr float kWedgeSlackPx = 1.0F;   // the edges' own blur belongs to the wedge
+constexpr double kSameWarp = 0.08;    // two planes whose local warps differ by less are one
+constexpr float kWedgeSlackPx = 1.0F; // the edges' own blur belongs to the wedge
 
 using Window = std::array<float, kMaxWindow * kMaxWindow>;
 
@@ -141,7 +141,7 @@ void cut_wedge(double angle_a, double angle_b, const CorrelateOptions &options, 
     auto ay = static_cast<float>(std::sin(angle_a));
     auto bx = static_cast<float>(std::cos(angle_b));
     auto by = static_cast<float>(std::sin(angle_b));
-    if (ax * by - ay * bx < 0) {  // a to b the short way round
+    if (ax * by - ay * bx < 0) { // a to b the short way round
         std::swap(ax, bx);
         std::swap(ay, by);
     }
@@ -166,7 +166,7 @@ void check(const CorrelateOptions &o)
     if (!ok) throw std::invalid_argument("correlation: an option is out of range");
 }
 
-}  // namespace
+} // namespace
 
 // ---- a view made ready ----
 
@@ -209,8 +209,8 @@ void PreparedView::prepare_pixels(double smooth_sigma_px)
 void PreparedView::prepare_junctions(const CorrelateOptions &options)
 {
     const std::vector<oc_junction_t> &junctions = posed_.view->junctions;
-    const std::vector<float> weights = window_weights(options);
-    const double min_weight = options.min_known * total_of(weights.data(), static_cast<int>(n_patch_));
+    weights_ = window_weights(options);
+    const double min_weight = options.min_known * total_of(weights_.data(), static_cast<int>(n_patch_));
     const double identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     edges_.resize(junctions.size() * OC_MAX_BRANCHES);
     patches_.resize(junctions.size() * n_patch_);
@@ -227,7 +227,7 @@ void PreparedView::prepare_junctions(const CorrelateOptions &options)
              &coarse_[i * kCoarse]);
         // A window correlates with itself exactly when enough of it is known and it is not flat.
         is_usable_.push_back(
-            vnc(patch, patch, weights.data(), static_cast<int>(n_patch_), min_weight, options.min_contrast) ? 1 : 0);
+            vnc(patch, patch, weights_.data(), static_cast<int>(n_patch_), min_weight, options.min_contrast) ? 1 : 0);
     }
 }
 
@@ -235,10 +235,10 @@ void PreparedView::prepare_junctions(const CorrelateOptions &options)
 
 struct Correlator::Hypothesis {
     oc_plane_t plane{};
-    std::array<double, 9> H{};  // right from left, anchored unless told otherwise
+    std::array<double, 9> H{}; // right from left, anchored unless told otherwise
     std::array<double, 9> H_back{};
     std::array<double, 4> J{};
-    int left_branch[2] = {-1, -1};  // that span the plane; -1: an extra plane
+    int left_branch[2] = {-1, -1}; // that span the plane; -1: an extra plane
     int right_branch[2] = {-1, -1};
     double coarse = 0;
 };
@@ -275,7 +275,7 @@ double turn(const oc_junction_t &junction, int from, int to)
     return std::sin(static_cast<double>(junction.branch[to].angle_rad) - junction.branch[from].angle_rad);
 }
 
-}  // namespace
+} // namespace
 
 Correlator::Correlator(const PreparedView &left, const PreparedView &right, const oc_pair_t &pair,
                        const CorrelateOptions &options)
@@ -341,7 +341,8 @@ void Correlator::add_branch_planes(int left, int right, const Eigen::Vector3d &p
             const double cosine = oc_vec3_dot(a.direction.d, b.direction.d);
             if (1 - cosine * cosine < options_.min_bend_sine * options_.min_bend_sine) continue;
             Hypothesis hypothesis;
-            if (oc_plane_from_directions(a.direction.d, b.direction.d, point.data(), &hypothesis.plane) != OC_OK) continue;
+            if (oc_plane_from_directions(a.direction.d, b.direction.d, point.data(), &hypothesis.plane) != OC_OK)
+                continue;
             if (!complete(left, right, &hypothesis)) continue;
             const bool is_new = std::none_of(out->begin(), out->end(),
                                              [&](const Hypothesis &h) { return is_same_warp(h.J, hypothesis.J); });
@@ -359,11 +360,12 @@ void Correlator::add_branch_planes(int left, int right, const Eigen::Vector3d &p
 // branches give no plane, one that faces both cameras is the least wrong.
 void Correlator::add_extra_planes(int left, int right, const Eigen::Vector3d &point, Hypotheses *out) const
 {
-    const Eigen::Vector3d facing = ((left_centre_ - point).normalized() + (right_centre_ - point).normalized()).normalized();
+    const Eigen::Vector3d facing =
+        ((left_centre_ - point).normalized() + (right_centre_ - point).normalized()).normalized();
     const Eigen::Vector3d upright = Eigen::Vector3d(facing.x(), facing.y(), 0).normalized();
     const Eigen::Vector3d side(-upright.y(), upright.x(), 0);
-    for (const Eigen::Vector3d &normal : {Eigen::Vector3d(0, 0, 1), upright, facing, turned(upright, side),
-                                          turned(upright, Eigen::Vector3d(-side))}) {
+    for (const Eigen::Vector3d &normal :
+         {Eigen::Vector3d(0, 0, 1), upright, facing, turned(upright, side), turned(upright, Eigen::Vector3d(-side))}) {
         if (!normal.allFinite()) continue;
         Hypothesis hypothesis;
         Eigen::Vector3d::Map(hypothesis.plane.n) = normal;
@@ -377,16 +379,16 @@ void Correlator::add_extra_planes(int left, int right, const Eigen::Vector3d &po
 
 // ---- scores ----
 
-double Correlator::coarse_score(int left, int right, const Hypothesis &hypothesis) const
+double Correlator::coarse_score(int left, const Hypothesis &hypothesis) const
 {
     static const std::vector<float> ones(PreparedView::kCoarse, 1.0F);
     const oc_junction_t &l = left_.junction(left);
     std::array<float, PreparedView::kCoarse> samples;
-    (void)right;
     warp(right_, hypothesis.H.data(), l.x_px, l.y_px, PreparedView::kCoarseSide, coarse_step(options_.window_px),
          samples.data());
     const double min_weight = options_.min_known * PreparedView::kCoarse;
-    return vnc(left_.coarse_patch(left), samples.data(), ones.data(), PreparedView::kCoarse, min_weight, 0).value_or(-1);
+    return vnc(left_.coarse_patch(left), samples.data(), ones.data(), PreparedView::kCoarse, min_weight, 0)
+        .value_or(-1);
 }
 
 double Correlator::full_score(int left, int right, const Hypothesis &hypothesis, double to_beat) const
@@ -400,8 +402,8 @@ double Correlator::full_score(int left, int right, const Hypothesis &hypothesis,
     Window cut;
     const float *weight = weights_.data();
     if (is_wedge) {
-        cut_wedge(l.branch[hypothesis.left_branch[0]].angle_rad, l.branch[hypothesis.left_branch[1]].angle_rad, options_,
-                  weights_, &cut);
+        cut_wedge(l.branch[hypothesis.left_branch[0]].angle_rad, l.branch[hypothesis.left_branch[1]].angle_rad,
+                  options_, weights_, &cut);
         weight = cut.data();
     }
     warp(right_, hypothesis.H.data(), l.x_px, l.y_px, options_.window_px, 1, samples.data());
@@ -446,7 +448,7 @@ std::optional<Correlation> Correlator::correlate(int left, int right, const Eige
     // Two levels: a sparse sample of every plane, the full window for the best of them.
     const bool is_sampled = options_.measure == Measure::kVnc && options_.support == Support::kWindow;
     if (is_sampled) {
-        for (Hypothesis &h : hypotheses) h.coarse = coarse_score(left, right, h);
+        for (Hypothesis &h : hypotheses) h.coarse = coarse_score(left, h);
         std::stable_sort(hypotheses.begin(), hypotheses.end(),
                          [](const Hypothesis &a, const Hypothesis &b) { return a.coarse > b.coarse; });
     }
@@ -476,7 +478,7 @@ std::optional<double> correlate_warped(const PreparedView &from, int junction, c
                                        const double to_from_from[9], const CorrelateOptions &options)
 {
     const int n = options.window_px * options.window_px;
-    const std::vector<float> weights = window_weights(options);
+    const std::vector<float> &weights = from.weights();
     Window samples;
     const oc_junction_t &j = from.junction(junction);
     warp(to, to_from_from, j.x_px, j.y_px, options.window_px, 1, samples.data());
@@ -484,4 +486,4 @@ std::optional<double> correlate_warped(const PreparedView &from, int junction, c
                options.min_contrast);
 }
 
-}  // namespace outcrop
+} // namespace outcrop

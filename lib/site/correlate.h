@@ -20,40 +20,40 @@
 namespace outcrop {
 
 enum class Measure {
-    kVnc,  // variance-normalised correlation, means over the warped samples; score -1..1
-    kSad   // mean-removed absolute difference; score 1 - mean / 64, at least 0
+    kVnc, // variance-normalised correlation, means over the warped samples; score -1..1
+    kSad  // mean-removed absolute difference; score 1 - mean / 64, at least 0
 };
 enum class Support {
-    kWindow,  // the upright square
-    kWedge    // only the part of it between the two branches that span the plane
+    kWindow, // the upright square
+    kWedge   // only the part of it between the two branches that span the plane
 };
 enum class Warp {
     kHomography,
-    kUnanchored,  // as Eq 5.34 is printed: wrong poses shift the window off the corner
-    kNone         // upright squares compared as they are
+    kUnanchored, // as Eq 5.34 is printed: wrong poses shift the window off the corner
+    kNone        // upright squares compared as they are
 };
 
 struct CorrelateOptions {
     Measure measure = Measure::kVnc;
     Support support = Support::kWindow;
     Warp warp = Warp::kHomography;
-    bool with_extra_planes = true;  // also a level, a facing and three upright planes through the point
-    int window_px = 21;             // side, odd, 7..31
-    double gauss_sigma_px = 5;      // of the weights round the apex; 0: all alike
-    double smooth_sigma_px = 1;     // of the pixels before sampling; 0: none
-    double min_known = 0.6;         // share of the window that both views must know
-    double min_contrast = 3;        // standard deviation in grey levels; flatter windows say nothing
-    double min_sine = 0.05;         // of the planes of a branch in both views; less: along the epipolar line
-    double min_bend_sine = 0.2;     // of the two edges in space that span a plane
-    double max_scale = 3;           // of the warp, either way
-    double max_stretch = 5;         // ratio of its singular values: no grazing planes
-    double coarse_reject = 0.5;     // VNC of a 7 x 7 sample under which a plane is dropped
-    int max_fine = 4;               // planes of a candidate that get the full window, best sample first
+    bool with_extra_planes = true; // also a level, a facing and three upright planes through the point
+    int window_px = 21;            // side, odd, 7..31
+    double gauss_sigma_px = 5;     // of the weights round the apex; 0: all alike
+    double smooth_sigma_px = 1;    // of the pixels before sampling; 0: none
+    double min_known = 0.6;        // share of the window that both views must know
+    double min_contrast = 3;       // standard deviation in grey levels; flatter windows say nothing
+    double min_sine = 0.05;        // of the planes of a branch in both views; less: along the epipolar line
+    double min_bend_sine = 0.2;    // of the two edges in space that span a plane
+    double max_scale = 3;          // of the warp, either way
+    double max_stretch = 5;        // ratio of its singular values: no grazing planes
+    double coarse_reject = 0.5;    // VNC of a 7 x 7 sample under which a plane is dropped
+    int max_fine = 4;              // planes of a candidate that get the full window, best sample first
 };
 
 // A plane under which two junctions look alike.
 struct Correlation {
-    double score = 0;  // the worse of left to right and right to left
+    double score = 0; // the worse of left to right and right to left
     oc_plane_t plane{};
 };
 
@@ -77,6 +77,9 @@ public:
     const float *patch(int index) const { return &patches_[static_cast<std::size_t>(index) * n_patch_]; }
     // Every third of them (the 7 x 7 sample).
     const float *coarse_patch(int index) const { return &coarse_[static_cast<std::size_t>(index) * kCoarse]; }
+
+    // Of a window's pixels, row-major.
+    const std::vector<float> &weights() const { return weights_; }
 
     // Grey value by bilinear interpolation; negative when one of the four pixels is not known.
     float sample(float x_px, float y_px) const
@@ -105,10 +108,10 @@ private:
 
     PosedView posed_;
     std::size_t n_patch_;
-    cv::Mat1f grey_;      // smoothed over known pixels
-    cv::Mat1b is_known_;  // the pixel and its right and lower neighbours
+    cv::Mat1f grey_;     // smoothed over known pixels
+    cv::Mat1b is_known_; // the pixel and its right and lower neighbours
     std::vector<oc_edge3_t> edges_;
-    std::vector<float> patches_, coarse_;
+    std::vector<float> patches_, coarse_, weights_;
     std::vector<char> is_usable_;
 };
 
@@ -135,7 +138,7 @@ private:
     void add_branch_planes(int left, int right, const Eigen::Vector3d &point, Hypotheses *out) const;
     void add_extra_planes(int left, int right, const Eigen::Vector3d &point, Hypotheses *out) const;
     bool complete(int left, int right, Hypothesis *hypothesis) const;
-    double coarse_score(int left, int right, const Hypothesis &hypothesis) const;
+    double coarse_score(int left, const Hypothesis &hypothesis) const;
     double full_score(int left, int right, const Hypothesis &hypothesis, double to_beat) const;
     std::optional<Correlation> correlate_upright(int left, int right, const Eigen::Vector3d &point) const;
 
@@ -144,7 +147,7 @@ private:
     const oc_pair_t &pair_;
     CorrelateOptions options_;
     Eigen::Vector3d left_centre_, right_centre_;
-    std::vector<float> weights_;  // of the window
+    std::vector<float> weights_; // of the window
 };
 
 // VNC of a junction's upright window with another view under a homography that
@@ -152,4 +155,4 @@ private:
 std::optional<double> correlate_warped(const PreparedView &from, int junction, const PreparedView &to,
                                        const double to_from_from[9], const CorrelateOptions &options);
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -2,8 +2,10 @@
 // JSON, PLY and PNG.
 #include "site/export.h"
 
+#include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <stdexcept>
 
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
@@ -22,9 +24,28 @@ json vector_json(const Eigen::Vector3d &v)
     return {v.x(), v.y(), v.z()};
 }
 
-json pixel_json(const View &view, int junction)
+// JSON has no NaN and no infinity; a reader would find null.
+void check_finite(const std::string &file, const json &value)
 {
-    const oc_junction_t &j = view.junctions.at(static_cast<std::size_t>(junction));
+    if (value.is_number_float() && !std::isfinite(value.get<double>()))
+        throw std::runtime_error(file + ": a number is not finite, nothing is written");
+    if (!value.is_structured()) return;
+    for (const json &item : value) check_finite(file, item);
+}
+
+std::string text_of(const std::string &file, const json &value)
+{
+    check_finite(file, value);
+    return value.dump(1) + "\n";
+}
+
+json pixel_json(const std::map<int, View> &views, int id, int junction)
+{
+    const auto at = views.find(id);
+    if (at == views.end() || junction < 0 || static_cast<std::size_t>(junction) >= at->second.junctions.size())
+        throw std::runtime_error("matches.json: a match names a view or a junction that is not there");
+    const View &view = at->second;
+    const oc_junction_t &j = view.junctions[static_cast<std::size_t>(junction)];
     double x = j.x_px, y = j.y_px;
     if (view.has_distortion) oc_distort(&view.camera.k, &view.distortion, j.x_px, j.y_px, &x, &y);
     return {x, y};
@@ -36,8 +57,8 @@ json matches_json(const SiteModel &model, const std::map<int, View> &views)
     for (const PairMatches &pair : model.pairs) {
         json matches = json::array();
         for (const Match &match : pair.matches) {
-            matches.push_back({{"left", pixel_json(views.at(pair.left), match.left_junction)},
-                               {"right", pixel_json(views.at(pair.right), match.right_junction)},
+            matches.push_back({{"left", pixel_json(views, pair.left, match.left_junction)},
+                               {"right", pixel_json(views, pair.right, match.right_junction)},
                                {"kind", match.kind == MatchKind::kGround ? "ground" : "obstacle"},
                                {"score", match.score},
                                {"point", vector_json(match.point)}});
@@ -104,6 +125,8 @@ std::string points_ply(const std::vector<SitePoint> &points)
                       "\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n"
                       "property uchar green\nproperty uchar blue\nproperty int obstacle\nend_header\n";
     for (const SitePoint &point : points) {
+        if (!point.position.allFinite())
+            throw std::runtime_error("model/points.ply: a point is not finite, nothing is written");
         char row[19];
         for (int i = 0; i < 3; i++) {
             const auto value = static_cast<float>(point.position[i]);
@@ -151,21 +174,25 @@ void write_overhead(const std::string &dir, const OverheadMap &overhead)
                 map_json(overhead.metres_per_pixel, overhead.x_min, overhead.y_max, overhead.rgb).dump(1) + "\n");
 }
 
-}  // namespace
+} // namespace
 
 void write_model_dir(const std::string &dir, const SiteModel &model, const std::map<int, View> &views,
                      const GroundMap &ground, const OverheadMap &overhead)
 {
+    // All texts first: a fault in one leaves the folder as it was.
+    const std::string matches = text_of(dir + "/matches.json", matches_json(model, views));
+    const std::string obstacles = text_of(
+        dir + "/model/obstacles.json",
+        {{"units", "m"}, {"obstacles", boxes_json(model.obstacles)}, {"suspected", boxes_json(model.suspected)}});
+    const std::string cameras = text_of(dir + "/model/cameras.json", cameras_json(model));
+    const std::string points = points_ply(model.points);
     std::filesystem::create_directories(dir + "/model");
-    write_whole(dir + "/matches.json", matches_json(model, views).dump(1) + "\n");
-    const json obstacles = {{"units", "m"},
-                            {"obstacles", boxes_json(model.obstacles)},
-                            {"suspected", boxes_json(model.suspected)}};
-    write_whole(dir + "/model/obstacles.json", obstacles.dump(1) + "\n");
-    write_whole(dir + "/model/points.ply", points_ply(model.points));
-    write_whole(dir + "/model/cameras.json", cameras_json(model).dump(1) + "\n");
+    write_whole(dir + "/matches.json", matches);
+    write_whole(dir + "/model/obstacles.json", obstacles);
+    write_whole(dir + "/model/points.ply", points);
+    write_whole(dir + "/model/cameras.json", cameras);
     write_ground(dir, ground);
     write_overhead(dir, overhead);
 }
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -23,4 +23,4 @@ namespace outcrop {
 void write_model_dir(const std::string &dir, const SiteModel &model, const std::map<int, View> &views,
                      const GroundMap &ground, const OverheadMap &overhead);
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "site/box_shadow.h"
 #include "site/boxes.h"
 #include "site/triangulate.h"
 
@@ -22,44 +23,10 @@ struct Eye {
     Vector3d centre = Vector3d::Zero();
 };
 
-// A box in its own axes: the world is shifted and turned so that it is [-half, half].
-struct Block {
-    Vector2d centre, along, across;
-    Vector3d half;
-    double z_middle = 0;
-
-    explicit Block(const Obstacle &box)
-        : centre(box.obb_centre.head<2>()),
-          along(std::cos(box.yaw_rad), std::sin(box.yaw_rad)),
-          across(-along.y(), along.x()),
-          half(box.obb_size / 2),
-          z_middle(box.obb_centre.z()) {}
-
-    Vector3d inside(const Vector3d &p) const {
-        const Vector2d off = p.head<2>() - centre;
-        return {along.dot(off), across.dot(off), p.z() - z_middle};
-    }
-
-    // Does the segment between the two points (in the box's axes) meet the box? Slabs.
-    bool blocks(const Vector3d &from, const Vector3d &to) const {
-        double enter = 0, leave = 1;
-        for (int k = 0; k < 3; ++k) {
-            const double d = to[k] - from[k];
-            if (d == 0) {
-                if (std::abs(from[k]) > half[k]) return false;
-                continue;
-            }
-            const double a = (-half[k] - from[k]) / d, b = (half[k] - from[k]) / d;
-            enter = std::max(enter, std::min(a, b));
-            leave = std::min(leave, std::max(a, b));
-        }
-        return enter < leave;
-    }
-};
-
 class Painter {
 public:
-    Painter(const SiteModel &model, const GroundMapOptions &options) : model_(model), options_(options) {
+    Painter(const SiteModel &model, const GroundMapOptions &options) : model_(model), options_(options)
+    {
         const Area &area = model.area;
         const double longer = std::max(area.x_max - area.x_min, area.y_max - area.y_min);
         map_.metres_per_pixel = options.cell_m > 0 ? options.cell_m : longer / 400;
@@ -68,11 +35,15 @@ public:
         map_.codes.create(cells(area.y_max - area.y_min), cells(area.x_max - area.x_min));
         map_.codes.setTo(0);
         for (const RefinedView &view : model.views) eyes_.push_back({view.camera, camera_centre(view.camera)});
-        for (const Obstacle &box : model.obstacles) blocks_.emplace_back(box);
-        for (const Obstacle &box : model.suspected) blocks_.emplace_back(box);
+        for (const RefinedView &view : model.views) {
+            const auto *sigma = view.posterior.v;
+            pose_sigma_ = std::max(pose_sigma_, std::max(sigma[0], sigma[1]));
+        }
+        blockers_ = blockers_of(model, 0);
     }
 
-    GroundMap paint() {
+    GroundMap paint()
+    {
         paint_free();
         paint_points();
         paint_boxes(model_.suspected, true);
@@ -82,7 +53,8 @@ public:
     }
 
 private:
-    int cells(double side) const {
+    int cells(double side) const
+    {
         const double n = std::ceil(side / map_.metres_per_pixel - 1e-9);
         if (!(n >= 1) || !(n <= options_.max_cells_per_side))
             throw std::invalid_argument("ground map: the area and the cell size do not give 1.." +
@@ -90,11 +62,13 @@ private:
         return static_cast<int>(n);
     }
 
-    Vector3d cell_centre(int row, int col) const {
+    Vector3d cell_centre(int row, int col) const
+    {
         return {map_.x_min + (col + 0.5) * map_.metres_per_pixel, map_.y_max - (row + 0.5) * map_.metres_per_pixel, 0};
     }
 
-    bool sees(const Eye &eye, const Vector3d &ground) const {
+    bool sees(const Eye &eye, const Vector3d &ground) const
+    {
         double x, y;
         if (!(oc_camera_project(&eye.camera, ground.data(), &x, &y) > 0)) return false;
         const double border = options_.border_px;
@@ -102,23 +76,14 @@ private:
                y <= eye.camera.k.height_px - 1.0 - border;
     }
 
-    void paint_free() {
-        std::vector<std::vector<Vector3d>> eye_in_block(blocks_.size());
-        for (std::size_t b = 0; b < blocks_.size(); ++b)
-            for (const Eye &eye : eyes_) eye_in_block[b].push_back(blocks_[b].inside(eye.centre));
-        std::vector<Vector3d> ground_in_block(blocks_.size());
+    void paint_free()
+    {
         for (int row = 0; row < map_.codes.rows; ++row) {
             for (int col = 0; col < map_.codes.cols; ++col) {
                 const Vector3d ground = cell_centre(row, col);
-                for (std::size_t b = 0; b < blocks_.size(); ++b) ground_in_block[b] = blocks_[b].inside(ground);
                 int n_seen = 0;
-                for (std::size_t e = 0; e < eyes_.size() && n_seen < options_.min_views; ++e) {
-                    if (!sees(eyes_[e], ground)) continue;
-                    bool is_blocked = false;
-                    for (std::size_t b = 0; b < blocks_.size() && !is_blocked; ++b)
-                        is_blocked = blocks_[b].blocks(eye_in_block[b][e], ground_in_block[b]);
-                    if (!is_blocked) ++n_seen;
-                }
+                for (std::size_t e = 0; e < eyes_.size() && n_seen < options_.min_views; ++e)
+                    n_seen += sees(eyes_[e], ground) && !is_hidden(blockers_, eyes_[e].centre, ground);
                 if (n_seen >= options_.min_views) set(row, col, GroundCode::kFree);
             }
         }
@@ -128,7 +93,8 @@ private:
 
     // Calls paint_cell for every cell whose centre is within `reach` of (x, y), as a square.
     template <typename PaintCell>
-    void around(double x, double y, double reach, const PaintCell &paint_cell) {
+    void around(double x, double y, double reach, const PaintCell &paint_cell)
+    {
         const double size = map_.metres_per_pixel;
         const auto clamped = [](double value, int limit) {
             return static_cast<int>(std::clamp(value, 0.0, static_cast<double>(limit)));
@@ -141,7 +107,8 @@ private:
             for (int col = col_from; col < col_to; ++col) paint_cell(row, col, cell_centre(row, col));
     }
 
-    void paint_points() {
+    void paint_points()
+    {
         for (const SitePoint &p : model_.points) {
             if (p.obstacle >= 0) continue;
             const double sigma = std::sqrt(std::max(p.covariance(0, 0), p.covariance(1, 1)));
@@ -154,11 +121,13 @@ private:
         }
     }
 
-    void paint_boxes(const std::vector<Obstacle> &boxes, bool is_ring) {
+    void paint_boxes(const std::vector<Obstacle> &boxes, bool is_ring)
+    {
         for (const Obstacle &box : boxes) {
             const double diagonal = box.obb_size.head<2>().norm();
             // Half a cell's diagonal, so that no cell that the box touches stays free.
-            const double grow = map_.metres_per_pixel * std::sqrt(0.5) + (is_ring ? options_.ring_share * diagonal : 0);
+            const double ring = options_.ring_share * diagonal + options_.pose_sigmas * pose_sigma_;
+            const double grow = map_.metres_per_pixel * std::sqrt(0.5) + (is_ring ? ring : 0);
             around(box.obb_centre.x(), box.obb_centre.y(), diagonal / 2 + 2 * grow,
                    [&](int row, int col, const Vector3d &cell) {
                        if (footprint_contains(box, cell.x(), cell.y(), grow))
@@ -171,21 +140,26 @@ private:
     const GroundMapOptions &options_;
     GroundMap map_;
     std::vector<Eye> eyes_;
-    std::vector<Block> blocks_;
+    std::vector<Blocker> blockers_;
+    double pose_sigma_ = 0; // the least certain view's, in X or Y
 };
 
-}  // namespace
+} // namespace
 
-void GroundMapOptions::check() const {
-    if (!(cell_m >= 0) || min_views < 1 || !(ring_share >= 0) || !(point_sigmas >= 0) || !(min_point_cells >= 0))
-        throw std::invalid_argument("ground map: cell_m, ring_share and point limits must be >= 0, min_views >= 1");
+void GroundMapOptions::check() const
+{
+    if (!(cell_m >= 0) || min_views < 1 || !(ring_share >= 0) || !(pose_sigmas >= 0) || !(point_sigmas >= 0) ||
+        !(min_point_cells >= 0))
+        throw std::invalid_argument(
+            "ground map: cell_m, ring_share, pose_sigmas and point limits must be >= 0, min_views >= 1");
     if (border_px < 0 || max_cells_per_side < 1)
         throw std::invalid_argument("ground map: border_px must be >= 0, max_cells_per_side >= 1");
 }
 
-GroundMap map_ground(const SiteModel &model, const GroundMapOptions &options) {
+GroundMap map_ground(const SiteModel &model, const GroundMapOptions &options)
+{
     options.check();
     return Painter(model, options).paint();
 }
 
-}  // namespace outcrop
+} // namespace outcrop

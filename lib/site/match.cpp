@@ -126,7 +126,7 @@ std::vector<Scored> score_candidates(const std::vector<Candidate> &candidates, c
 
 // A mutual best pair that is alike and unique enough.
 struct Chosen {
-    int index = 0;  // in the scored candidates
+    int index = 0; // in the scored candidates
     double margin = 0;
 };
 
@@ -168,7 +168,7 @@ void narrow(const oc_pair_t &pair, const PreparedView &left, const PreparedView 
     }
 }
 
-}  // namespace
+} // namespace
 
 MatchOptions thesis_match_options()
 {
@@ -186,7 +186,8 @@ MatchOptions thesis_match_options()
     return options;
 }
 
-PairResult match_pair(const PreparedView &left, const PreparedView &right, const Area &area, const MatchOptions &options)
+PairResult match_pair(const PreparedView &left, const PreparedView &right, const Area &area,
+                      const MatchOptions &options)
 {
     const PosedView &posed_left = left.posed();
     const PosedView &posed_right = right.posed();
@@ -248,8 +249,7 @@ std::optional<double> look_in(const PreparedView &third, const PreparedView &lef
         for (double dx = -search_px; dx <= search_px; dx += 1) {
             double anchored[9];
             if (oc_homography_anchor(H, junction.x_px, junction.y_px, x + dx, y + dy, anchored) != OC_OK) continue;
-            const std::optional<double> score =
-                correlate_warped(left, match.left_junction, third, anchored, correlate);
+            const std::optional<double> score = correlate_warped(left, match.left_junction, third, anchored, correlate);
             if (score && *score > best.value_or(-2)) best = score;
         }
     }
@@ -272,7 +272,7 @@ bool is_denied(const PreparedView &left, const PreparedView &right, const std::v
     return denials >= options.min_denials;
 }
 
-}  // namespace
+} // namespace
 
 int verify_with_third_views(const PreparedView &left, const PreparedView &right,
                             const std::vector<const PreparedView *> &others, const CorrelateOptions &correlate,
@@ -292,4 +292,4 @@ int verify_with_third_views(const PreparedView &left, const PreparedView &right,
     return n_dropped;
 }
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -15,11 +15,11 @@ struct MatchOptions {
     StripOptions strip;
     CorrelateOptions correlate;
     double min_score = 0.80;
-    double min_margin = 0.05;     // to the runner-up at another place, seen from either view
-    double same_place_px = 3;     // nearer junctions are one place
-    double ground_height_m = 0.005;  // a corner this near Z = 0 may be drawn on the ground ...
+    double min_margin = 0.05;          // to the runner-up at another place, seen from either view
+    double same_place_px = 3;          // nearer junctions are one place
+    double ground_height_m = 0.005;    // a corner this near Z = 0 may be drawn on the ground ...
     double ground_score_slack = 0.02;  // ... if the ground's own homography is at most this much worse
-    bool narrows_strip = true;    // learn the pair's pose errors from its matches and choose again
+    bool narrows_strip = true;         // learn the pair's pose errors from its matches and choose again
     double min_score_to_narrow = 0.9;  // of the matches that they are learnt from
     bool with_pose_covariance = false; // of the point: poses' margins too, not the pixels' noise only
 };
@@ -31,8 +31,8 @@ MatchOptions thesis_match_options();
 // Matches with what third views need to check them.
 struct PairResult {
     PairMatches pair;
-    std::vector<oc_plane_t> planes;  // of each match, through its point
-    int n_candidates = 0;            // pairs of junctions that the geometry allows
+    std::vector<oc_plane_t> planes; // of each match, through its point
+    int n_candidates = 0;           // pairs of junctions that the geometry allows
 };
 
 // Match two views, ascending (left_junction). Both prepared with options.correlate.
@@ -46,10 +46,10 @@ PairResult match_pair(const PreparedView &left, const PreparedView &right, const
                       const MatchOptions &options = {});
 
 struct ThirdViewOptions {
-    double search_px = 2;        // how far from the projection the corner may be; a few times the poses' error
-    double min_confirmed = 0.8;  // a third view that is this much alike confirms
-    double max_denied = 0.6;     // one that is less alike than this denies
-    int min_denials = 1;         // denials without any confirmation that make a match wrong
+    double search_px = 1;       // how far from the projection the corner may be; a few times the poses' error
+    double min_confirmed = 0.8; // a third view that is this much alike confirms
+    double max_denied = 0.6;    // one that is less alike than this denies
+    int min_denials = 1;        // denials without any confirmation that make a match wrong
 };
 
 // Drop matches that third views contradict. A view has a say where it sees the
@@ -60,4 +60,4 @@ int verify_with_third_views(const PreparedView &left, const PreparedView &right,
                             const std::vector<const PreparedView *> &others, const CorrelateOptions &correlate,
                             const ThirdViewOptions &options, PairResult *result);
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -21,8 +21,10 @@ using Eigen::Vector3d;
 class StepTimer {
 public:
     StepTimer(std::map<std::string, double> *ms, const char *step)
-        : ms_(ms), step_(step), start_(std::chrono::steady_clock::now()) {}
-    ~StepTimer() {
+        : ms_(ms), step_(step), start_(std::chrono::steady_clock::now())
+    {}
+    ~StepTimer()
+    {
         const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start_;
         (*ms_)[step_] += spent.count();
     }
@@ -35,8 +37,9 @@ private:
     std::chrono::steady_clock::time_point start_;
 };
 
-std::vector<View> sorted_views(const std::vector<View> &views) {
-    std::vector<View> sorted = views;  // pixels are shared, not copied
+std::vector<View> sorted_views(const std::vector<View> &views)
+{
+    std::vector<View> sorted = views; // pixels are shared, not copied
     std::sort(sorted.begin(), sorted.end(), [](const View &a, const View &b) { return a.id < b.id; });
     for (std::size_t i = 0; i < sorted.size(); ++i) {
         const std::string name = "model: view " + std::to_string(sorted[i].id);
@@ -50,20 +53,23 @@ std::vector<View> sorted_views(const std::vector<View> &views) {
     return sorted;
 }
 
-void check_area(const Area &area) {
+void check_area(const Area &area)
+{
     const bool is_good = area.x_max > area.x_min && area.y_max > area.y_min && area.z_max > 0 &&
                          std::isfinite(area.x_max - area.x_min) && std::isfinite(area.y_max - area.y_min) &&
                          std::isfinite(area.z_max);
     if (!is_good) throw std::invalid_argument("model: the area must have x, y ascending and z_max > 0");
 }
 
-double mean_height(const std::vector<View> &views) {
+double mean_height(const std::vector<View> &views)
+{
     double sum = 0;
     for (const View &view : views) sum += std::abs(camera_centre(view.camera).z());
     return views.empty() ? 0 : sum / static_cast<double>(views.size());
 }
 
-bool sees_ground(const View &view, const Vector3d &ground, double reach) {
+bool sees_ground(const View &view, const Vector3d &ground, double reach)
+{
     const Vector3d centre = camera_centre(view.camera);
     if ((ground - centre).head<2>().norm() > reach * std::abs(centre.z())) return false;
     double x, y;
@@ -71,15 +77,17 @@ bool sees_ground(const View &view, const Vector3d &ground, double reach) {
     return x >= 0 && y >= 0 && x <= view.camera.k.width_px - 1.0 && y <= view.camera.k.height_px - 1.0;
 }
 
-bool is_exact(const View &view, double exact_sigma) {
+bool is_exact(const View &view, double exact_sigma)
+{
     for (const double half_width : view.margin.v)
         if (!(half_width < exact_sigma)) return false;
     return true;
 }
 
-}  // namespace
+} // namespace
 
-void BuildOptions::check() const {
+void BuildOptions::check() const
+{
     tracks.check();
     refine.check();
     cluster.check();
@@ -88,7 +96,8 @@ void BuildOptions::check() const {
     if (!(area_z_share > 0) || !(area_reach > 0)) throw std::invalid_argument("model: area shares must be > 0");
 }
 
-Area derive_area(const std::vector<View> &views, const BuildOptions &options) {
+Area derive_area(const std::vector<View> &views, const BuildOptions &options)
+{
     Area area;
     if (views.empty()) return area;
     constexpr int kCells = 64;
@@ -131,7 +140,8 @@ namespace {
 class Builder {
 public:
     Builder(std::vector<View> views, const std::optional<Area> &area, const BuildOptions &options)
-        : views_(std::move(views)), options_(options) {
+        : views_(std::move(views)), options_(options)
+    {
         model_.area = area ? *area : derive_area(views_, options);
         if (!views_.empty()) check_area(model_.area);
         diagonal_ = std::hypot(model_.area.x_max - model_.area.x_min, model_.area.y_max - model_.area.y_min);
@@ -144,10 +154,12 @@ public:
         }
     }
 
-    SiteModel build(const Matcher &matcher) {
+    SiteModel build(const Matcher &matcher)
+    {
         model_.counts["views"] = static_cast<double>(views_.size());
         if (views_.size() >= 2) {
             const int passes = is_exact_ ? 1 : options_.passes;
+            if (!is_exact_ && options_.ties_first && has_ties()) refine_on({});
             for (int i = 0; i < passes; ++i) pass(matcher, i);
             settle();
             keep_matches();
@@ -158,7 +170,13 @@ public:
     }
 
 private:
-    static RefinedView unrefined(const View &view) {
+    bool has_ties() const
+    {
+        return std::any_of(views_.begin(), views_.end(), [](const View &view) { return !view.ties.empty(); });
+    }
+
+    static RefinedView unrefined(const View &view)
+    {
         RefinedView refined;
         refined.id = view.id;
         refined.camera = view.camera;
@@ -166,14 +184,15 @@ private:
         return refined;
     }
 
-    void pass(const Matcher &matcher, int index) {
+    void pass(const Matcher &matcher, int index)
+    {
         {
             StepTimer timer(&model_.ms, "match");
             MatchPass request;
             request.index = index;
             request.is_last = index + 1 == (is_exact_ ? 1 : options_.passes);
             request.area = model_.area;
-            request.angles = index == 0 ? options_.match.strip.angles : OC_ANGLE_ERROR_LOCAL;
+            request.angles = is_refined_ ? OC_ANGLE_ERROR_LOCAL : options_.match.strip.angles;
             for (std::size_t i = 0; i < views_.size(); ++i)
                 request.views.push_back({&views_[i], cameras_[i], margins_[i]});
             model_.pairs = matcher(request);
@@ -188,10 +207,18 @@ private:
         if (!is_exact_) refine();
     }
 
-    void refine() {
+    void refine()
+    {
         settle();
+        refine_on(tracks_);
+    }
+
+    // From the reported poses anew, with all there is: the vehicle's ties and these tracks.
+    void refine_on(const std::vector<Track> &tracks)
+    {
         StepTimer timer(&model_.ms, "refine");
-        RefineResult result = refine_poses(views_, tracks_, options_.refine);
+        RefineResult result = refine_poses(views_, tracks, options_.refine);
+        is_refined_ = true;
         model_.views = result.views;
         covariances_ = std::move(result.relative_covariances);
         margins_ = std::move(result.matching_margins);
@@ -203,14 +230,16 @@ private:
         model_.counts["refine_rms_after_px"] = result.rms_after_px;
     }
 
-    void settle() {
+    void settle()
+    {
         StepTimer timer(&model_.ms, "tracks");
         tracks_ = settle_tracks(views_, cameras_, is_exact_ ? std::vector<Matrix6d>() : covariances_, merged_,
                                 model_.area, options_.tracks, &model_.counts);
     }
 
     // Matches that no settled track holds are left out; the others take its point.
-    void keep_matches() {
+    void keep_matches()
+    {
         std::map<int, int> index;
         for (std::size_t i = 0; i < views_.size(); ++i) index[views_[i].id] = static_cast<int>(i);
         std::map<TrackPixel, const Track *> track_of;
@@ -236,7 +265,8 @@ private:
     }
 
     // Mean of the pixels known round the apex, in all views.
-    cv::Vec3b colour_of(const Track &track) const {
+    cv::Vec3b colour_of(const Track &track) const
+    {
         double sum = 0;
         int n = 0;
         for (const TrackPixel &p : track.pixels) {
@@ -256,7 +286,8 @@ private:
         return {grey, grey, grey};
     }
 
-    void make_points() {
+    void make_points()
+    {
         StepTimer timer(&model_.ms, "points");
         double n_ground = 0;
         for (const Track &track : tracks_) {
@@ -276,7 +307,8 @@ private:
         model_.counts["points"] = static_cast<double>(model_.points.size());
     }
 
-    void group() {
+    void group()
+    {
         StepTimer timer(&model_.ms, "cluster");
         const Clusters clusters = cluster_points(model_.points, diagonal_, options_.cluster);
         make_boxes(clusters, diagonal_, options_.boxes, &model_.points, &model_.obstacles, &model_.suspected);
@@ -290,18 +322,20 @@ private:
     SiteModel model_;
     double diagonal_ = 0;
     bool is_exact_ = true;
-    std::vector<oc_camera_t> cameras_;     // as believed now
-    std::vector<oc_margin_t> margins_;     // for matching
-    std::vector<Matrix6d> covariances_;    // of the poses, between views
+    bool is_refined_ = false;           // cameras_ and margins_ come from refine_poses
+    std::vector<oc_camera_t> cameras_;  // as believed now
+    std::vector<oc_margin_t> margins_;  // for matching
+    std::vector<Matrix6d> covariances_; // of the poses, between views
     std::vector<Track> merged_, tracks_;
 };
 
-std::vector<PairMatches> match_all(const MatchPass &pass, const BuildOptions &options) {
+std::vector<PairMatches> match_all(const MatchPass &pass, const BuildOptions &options)
+{
     MatchOptions match = options.match;
     match.strip.angles = pass.angles;
+    if (!pass.is_last) match.min_score = std::max(match.min_score, options.min_score_to_refine);
     std::vector<std::unique_ptr<PreparedView>> prepared;
-    for (const PosedView &view : pass.views)
-        prepared.push_back(std::make_unique<PreparedView>(view, match.correlate));
+    for (const PosedView &view : pass.views) prepared.push_back(std::make_unique<PreparedView>(view, match.correlate));
     std::vector<PairMatches> matches;
     for (const ViewPair &pair : select_pairs(pass.views, pass.area, options.pairs)) {
         const PreparedView &left = *prepared[static_cast<std::size_t>(pair.left)];
@@ -317,17 +351,19 @@ std::vector<PairMatches> match_all(const MatchPass &pass, const BuildOptions &op
     return matches;
 }
 
-}  // namespace
+} // namespace
 
 SiteModel build_from_matches(const std::vector<View> &views, const std::optional<Area> &area, const Matcher &matcher,
-                             const BuildOptions &options) {
+                             const BuildOptions &options)
+{
     options.check();
     return Builder(sorted_views(views), area, options).build(matcher);
 }
 
-SiteModel build_site(const std::vector<View> &views, const std::optional<Area> &area, const BuildOptions &options) {
+SiteModel build_site(const std::vector<View> &views, const std::optional<Area> &area, const BuildOptions &options)
+{
     return build_from_matches(
         views, area, [&options](const MatchPass &pass) { return match_all(pass, options); }, options);
 }
 
-}  // namespace outcrop
+} // namespace outcrop

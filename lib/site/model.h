@@ -21,28 +21,30 @@ struct BuildOptions {
     PairOptions pairs;
     MatchOptions match;
     ThirdViewOptions third_views;
-    bool with_third_views = true;  // matches of the last pass are checked in other views
+    bool with_third_views = true;     // matches of the last pass are checked in other views
+    double min_score_to_refine = 0.9; // of matches that only serve to refine the poses (all passes but the last)
     TrackOptions tracks;
     RefineOptions refine;
     ClusterOptions cluster;
     BoxOptions boxes;
-    int passes = 2;             // of matching; refinement comes after each but is left out when every pose is exact
-    double area_z_share = 0.5;  // z_max of a derived area, of the mean camera height
-    double area_reach = 3.0;    // a derived area reaches no farther from a camera than this many camera heights
-    void check() const;         // throws std::invalid_argument
+    int passes = 2;            // of matching; refinement comes after each but is left out when every pose is exact
+    bool ties_first = true;    // refine on the vehicle's ground ties alone before the first pass: narrower strips
+    double area_z_share = 1.0; // z_max of a derived area, of the mean camera height
+    double area_reach = 8.0;   // a derived area reaches no farther from a camera than this many camera heights
+    void check() const;        // throws std::invalid_argument
 };
 
 // What one matching pass gets: the views in ascending order of id, with the poses believed now.
 struct MatchPass {
-    int index = 0;         // 0: the sensor's poses and margins
+    int index = 0;
     bool is_last = false;
     std::vector<PosedView> views;
-    oc_angle_error_t angles = OC_ANGLE_ERROR_OPK;  // how the margins' angles are meant
+    oc_angle_error_t angles = OC_ANGLE_ERROR_OPK; // how the margins' angles are meant
     Area area;
 };
 using Matcher = std::function<std::vector<PairMatches>(const MatchPass &)>;
 
-// Pairs -> matches in strips of the margins -> tracks -> refinement -> matches again in the posterior's strips ->
+// Refinement on the ties -> pairs -> matches in strips of the margins -> tracks -> refinement -> matches again in the posterior's strips ->
 // tracks -> points -> clusters -> boxes. A pure function of the views as a set: they are sorted by id first, sums run
 // in fixed order, one thread. Bit-identical between calls (SiteModel::ms apart). area empty: derive_area.
 // Fewer than two views give a model without points. Throws std::invalid_argument for options out of range, ids that
@@ -58,4 +60,4 @@ SiteModel build_from_matches(const std::vector<View> &views, const std::optional
 // mean camera height. Without such ground: a square round the cameras' mean centre, two mean heights wide.
 Area derive_area(const std::vector<View> &views, const BuildOptions &options = {});
 
-}  // namespace outcrop
+} // namespace outcrop

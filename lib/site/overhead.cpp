@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <optional>
 #include <stdexcept>
 
@@ -22,6 +23,15 @@ constexpr double kBoxGrowShare = 0.06;
 // Samples per side of a tile when planning.
 constexpr int kPlanSamples = 16;
 
+// Samples per side of the area when choosing the scale.
+constexpr int kScaleSamples = 48;
+
+// A tile of which the best view shows less than this share is not asked for.
+constexpr double kMinShare = 0.02;
+
+// No map is larger, whatever scale a tile claims.
+constexpr double kMaxMapSide = 16384;
+
 // Over so many pixels a view fades out towards the edge of what it shows.
 constexpr double kFeatherPx = 10;
 
@@ -31,7 +41,8 @@ constexpr int kMinOverlapPx = 200;
 // How one view sees the ground.
 class GroundEye {
 public:
-    GroundEye(const RefinedView &view, const std::vector<Blocker> &blockers) : camera_(view.camera), blockers_(&blockers)
+    GroundEye(const RefinedView &view, const std::vector<Blocker> &blockers)
+        : camera_(view.camera), blockers_(&blockers)
     {
         double centre[3];
         oc_pose_centre(&camera_.pose, centre);
@@ -60,67 +71,108 @@ private:
     Eigen::Vector3d centre_;
 };
 
-double scale_of(const Area &area, const OverheadOptions &options)
+// An area may be much larger than the ground that is in sight, so what counts is how much of it any view shows.
+double scale_of(const Area &area, const std::vector<GroundEye> &eyes, const OverheadOptions &options)
 {
     if (options.metres_per_pixel > 0) return options.metres_per_pixel;
-    return std::max(area.x_max - area.x_min, area.y_max - area.y_min) / options.pixels_per_side;
+    const double width = area.x_max - area.x_min, height = area.y_max - area.y_min;
+    int n_seen = 0;
+    for (int i = 0; i < kScaleSamples * kScaleSamples; i++) {
+        const double x = area.x_min + (i % kScaleSamples + 0.5) / kScaleSamples * width;
+        const double y = area.y_min + (i / kScaleSamples + 0.5) / kScaleSamples * height;
+        n_seen += std::any_of(eyes.begin(), eyes.end(), [&](const GroundEye &eye) { return eye.worth(x, y) > 0; });
+    }
+    const double share = n_seen > 0 ? n_seen / static_cast<double>(kScaleSamples * kScaleSamples) : 1;
+    return std::sqrt(width * height * share) / options.pixels_per_side;
+}
+
+double farthest_of(const Area &area)
+{
+    return std::max({std::abs(area.x_min), std::abs(area.x_max), std::abs(area.y_min), std::abs(area.y_max)});
 }
 
 int tile_px_of(const OverheadOptions &options)
 {
     if (options.tile_px > 0) return options.tile_px;
-    if (options.datagram_bytes >= 1000) return 96;
-    return options.datagram_bytes >= 500 ? 64 : 32;
+    if (options.datagram_bytes >= 1000) return 64;
+    return options.datagram_bytes >= 500 ? 48 : 32;
 }
 
-struct PlannedTile {
-    oc_tile_id_t tile;
-    std::vector<int> views;  // indices into the model's views
+// How well each view shows each sample of a tile: 0 not at all, else kSeen
+// to 1 by resolution against the best view there.
+class TileViews {
+public:
+    TileViews(oc_tile_id_t tile, double side_m, const Area &area, const std::vector<GroundEye> &eyes)
+    {
+        std::vector<Eigen::Vector2d> cells;
+        for (int r = 0; r < kPlanSamples; r++) {
+            for (int c = 0; c < kPlanSamples; c++) {
+                const double x = (tile.ix + (c + 0.5) / kPlanSamples) * side_m;
+                const double y = (tile.iy + (r + 0.5) / kPlanSamples) * side_m;
+                if (x >= area.x_min && x <= area.x_max && y >= area.y_min && y <= area.y_max) cells.emplace_back(x, y);
+            }
+        }
+        value_.assign(eyes.size(), std::vector<double>(cells.size()));
+        for (std::size_t i = 0; i < cells.size(); i++) {
+            double best = 0;
+            for (std::size_t e = 0; e < eyes.size(); e++)
+                best = std::max(best, value_[e][i] = eyes[e].worth(cells[i].x(), cells[i].y()));
+            for (std::size_t e = 0; e < eyes.size(); e++)
+                if (value_[e][i] > 0) value_[e][i] = kSeen + (1 - kSeen) * std::sqrt(value_[e][i] / best);
+        }
+    }
+
+    // Share of a whole tile that a set of views shows, each sample by its best view.
+    double shown(const std::vector<int> &views) const
+    {
+        double sum = 0;
+        for (std::size_t i = 0; !value_.empty() && i < value_[0].size(); i++) {
+            double best = 0;
+            for (const int view : views) best = std::max(best, value_[static_cast<std::size_t>(view)][i]);
+            sum += best;
+        }
+        return sum / (kPlanSamples * kPlanSamples);
+    }
+
+    int n_views() const { return static_cast<int>(value_.size()); }
+
+private:
+    static constexpr double kSeen = 0.7;
+    std::vector<std::vector<double>> value_;
 };
 
-PlannedTile plan_tile(oc_tile_id_t tile, double side_m, const Area &area, const std::vector<GroundEye> &eyes,
-                      const OverheadOptions &options)
+// The best view for one place of a set; ties go to the lower view. Returns what the set then shows.
+double fill_place(const TileViews &tile, std::size_t place, std::vector<int> *views)
 {
-    std::vector<Eigen::Vector2d> cells;
-    for (int r = 0; r < kPlanSamples; r++) {
-        for (int c = 0; c < kPlanSamples; c++) {
-            const double x = (tile.ix + (c + 0.5) / kPlanSamples) * side_m;
-            const double y = (tile.iy + (r + 0.5) / kPlanSamples) * side_m;
-            if (x >= area.x_min && x <= area.x_max && y >= area.y_min && y <= area.y_max) cells.emplace_back(x, y);
+    std::vector<int> set = *views;
+    double most = tile.shown(set);
+    for (int view = 0; view < tile.n_views(); view++) {
+        set[place] = view;
+        const double shown = tile.shown(set);
+        if (shown > most + 1e-12) {
+            most = shown;
+            (*views)[place] = view;
         }
     }
-    std::vector<std::vector<double>> worth(eyes.size(), std::vector<double>(cells.size()));
-    for (std::size_t e = 0; e < eyes.size(); e++) {
-        for (std::size_t i = 0; i < cells.size(); i++) worth[e][i] = eyes[e].worth(cells[i].x(), cells[i].y());
+    return most;
+}
+
+// Grows the set while a further view adds enough; after each, every earlier choice is thought over again.
+std::vector<int> plan_tile(const TileViews &tile, const OverheadOptions &options)
+{
+    std::vector<int> views;
+    double shown = 0;
+    while (static_cast<int>(views.size()) < std::min(options.max_views_per_tile, tile.n_views())) {
+        std::vector<int> more = views;
+        more.push_back(views.empty() ? 0 : views.front());
+        double now = fill_place(tile, more.size() - 1, &more);
+        for (std::size_t place = 0; place + 1 < more.size(); place++) now = fill_place(tile, place, &more);
+        if (now - shown < (views.empty() ? kMinShare : options.min_gain)) break;
+        views = more;
+        shown = now;
     }
-    PlannedTile out{tile, {}};
-    std::vector<char> is_covered(cells.size(), 0);
-    while (static_cast<int>(out.views.size()) < options.max_views_per_tile) {
-        int best = -1;
-        double best_worth = 0;
-        std::size_t best_gain = 0;
-        for (std::size_t e = 0; e < eyes.size(); e++) {
-            double sum = 0;
-            std::size_t gain = 0;
-            for (std::size_t i = 0; i < cells.size(); i++) {
-                if (is_covered[i] || worth[e][i] <= 0) continue;
-                gain++;
-                sum += std::sqrt(worth[e][i]);
-            }
-            if (sum > best_worth) {
-                best = static_cast<int>(e);
-                best_worth = sum;
-                best_gain = gain;
-            }
-        }
-        const double share = out.views.empty() ? 0.02 : options.min_gain;
-        if (best < 0 || static_cast<double>(best_gain) < share * static_cast<double>(cells.size())) break;
-        out.views.push_back(best);
-        for (std::size_t i = 0; i < cells.size(); i++) {
-            if (worth[static_cast<std::size_t>(best)][i] > 0) is_covered[i] = 1;
-        }
-    }
-    return out;
+    std::sort(views.begin(), views.end());
+    return views;
 }
 
 std::vector<GroundEye> eyes_of(const SiteModel &model, const std::vector<Blocker> &blockers)
@@ -132,14 +184,29 @@ std::vector<GroundEye> eyes_of(const SiteModel &model, const std::vector<Blocker
 
 // A decoded tile on the map: its pixels, weights, and where it goes.
 struct Layer {
-    int view = 0;  // index into the model's views
+    int view = 0; // index into the model's views
     cv::Rect place;
     cv::Mat3f rgb;
     cv::Mat1f weight;
 };
 
+// Does a WebP file say that it is as large as the tile? Asked before decoding: a few bytes may stand for a huge image.
+bool is_webp_of(const std::vector<std::uint8_t> &b, int side)
+{
+    const auto text = [&](std::size_t at, const char *four) { return std::memcmp(b.data() + at, four, 4) == 0; };
+    if (b.size() < 30 || !text(0, "RIFF") || !text(8, "WEBP")) return false;
+    const auto word = [&](std::size_t at) { return b[at] | b[at + 1] << 8; };
+    if (text(12, "VP8 ")) return (word(26) & 0x3fff) == side && (word(28) & 0x3fff) == side;
+    if (text(12, "VP8L")) {
+        const unsigned bits = static_cast<unsigned>(word(21)) | static_cast<unsigned>(word(23)) << 16;
+        return static_cast<int>(bits & 0x3fff) + 1 == side && static_cast<int>(bits >> 14 & 0x3fff) + 1 == side;
+    }
+    return text(12, "VP8X") && word(24) + (b[26] << 16) + 1 == side && word(27) + (b[29] << 16) + 1 == side;
+}
+
 std::optional<cv::Mat3b> decode(const TileKey &key, const TileBlob &blob)
 {
+    if (blob.codec == OC_CODEC_WEBP && !is_webp_of(blob.bytes, key.tile_px)) return std::nullopt;
     const cv::Mat bgr = cv::imdecode(blob.bytes, cv::IMREAD_COLOR);
     if (bgr.empty() || bgr.cols != key.tile_px || bgr.rows != key.tile_px) return std::nullopt;
     cv::Mat3b rgb;
@@ -203,7 +270,7 @@ public:
         });
     }
 
-    void finish(OverheadMap *map) const
+    void finish(double gain, OverheadMap *map) const
     {
         map->rgb = cv::Mat3b(sum_.size(), cv::Vec3b(0, 0, 0));
         map->seen = cv::Mat1b(sum_.size(), static_cast<unsigned char>(0));
@@ -211,7 +278,7 @@ public:
             for (int x = 0; x < sum_.cols; x++) {
                 if (weight_(y, x) <= 0) continue;
                 for (int c = 0; c < 3; c++)
-                    map->rgb(y, x)[c] = cv::saturate_cast<unsigned char>(sum_(y, x)[c] / weight_(y, x));
+                    map->rgb(y, x)[c] = cv::saturate_cast<unsigned char>(gain * sum_(y, x)[c] / weight_(y, x));
                 map->seen(y, x) = 255;
             }
         }
@@ -232,7 +299,34 @@ private:
     cv::Mat1f weight_;
 };
 
-}  // namespace
+bool is_scale_for(const Area &area, double scale)
+{
+    const double side = std::max(area.x_max - area.x_min, area.y_max - area.y_min);
+    return scale > 0 && side / scale <= kMaxMapSide && farthest_of(area) / scale < 1e9;
+}
+
+// Of several scales (an older plan's tiles may be among them) the one with the most tiles counts; tiles whose scale
+// would make a map out of all measure count as bad.
+double scale_of_tiles(const Area &area, const std::map<TileKey, TileBlob> &tiles, double otherwise, int *n_bad)
+{
+    std::map<double, int> scales;
+    for (const auto &[key, blob] : tiles) {
+        if (is_scale_for(area, key.metres_per_pixel)) {
+            scales[key.metres_per_pixel]++;
+        } else {
+            ++*n_bad;
+        }
+    }
+    double scale = is_scale_for(area, otherwise) ? otherwise : 1; // 1: an area without extent
+    int most = 0;
+    for (const auto &[candidate, n] : scales) {
+        if (n > most) scale = candidate;
+        most = std::max(most, n);
+    }
+    return scale;
+}
+
+} // namespace
 
 void OverheadOptions::check() const
 {
@@ -248,11 +342,11 @@ std::vector<TileRequest> plan_overhead(const SiteModel &model, const OverheadOpt
 {
     options.check();
     const Area &area = model.area;
-    const auto scale = static_cast<double>(static_cast<float>(scale_of(area, options)));  // as it will travel
-    const int tile_px = tile_px_of(options);
-    const double side_m = tile_px * scale;
     const std::vector<Blocker> blockers = blockers_of(model, kBoxGrowShare);
     const std::vector<GroundEye> eyes = eyes_of(model, blockers);
+    const auto scale = static_cast<double>(static_cast<float>(scale_of(area, eyes, options))); // as it will travel
+    const int tile_px = tile_px_of(options);
+    const double side_m = tile_px * scale;
 
     std::vector<TileRequest> out(model.views.size());
     for (std::size_t i = 0; i < out.size(); i++) {
@@ -262,11 +356,12 @@ std::vector<TileRequest> plan_overhead(const SiteModel &model, const OverheadOpt
         out[i].tile_px = tile_px;
         out[i].quality = options.quality;
     }
+    if (!(farthest_of(area) < 32767 * side_m)) return {}; // tiles are numbered with 16 bits
     const auto first = [&](double low) { return static_cast<int>(std::floor(low / side_m)); };
     for (int iy = first(area.y_min); iy * side_m < area.y_max; iy++) {
         for (int ix = first(area.x_min); ix * side_m < area.x_max; ix++) {
             const oc_tile_id_t tile{static_cast<std::int16_t>(ix), static_cast<std::int16_t>(iy)};
-            for (const int view : plan_tile(tile, side_m, area, eyes, options).views)
+            for (const int view : plan_tile(TileViews(tile, side_m, area, eyes), options))
                 out[static_cast<std::size_t>(view)].tiles.push_back(tile);
         }
     }
@@ -278,24 +373,16 @@ OverheadMap compose_overhead(const SiteModel &model, const std::map<TileKey, Til
                              const OverheadOptions &options, int *n_bad_tiles)
 {
     options.check();
-    // Of several scales (an older plan's tiles may be among them) the one with the most tiles counts.
-    std::map<double, int> scales;
-    for (const auto &[key, blob] : tiles) scales[key.metres_per_pixel]++;
-    double scale = scale_of(model.area, options);
-    int most = 0;
-    for (const auto &[candidate, n] : scales) {
-        if (n > most) scale = candidate;
-        most = std::max(most, n);
-    }
-
-    const Area &area = model.area;
-    const int left = static_cast<int>(std::floor(area.x_min / scale)), top = static_cast<int>(std::ceil(area.y_max / scale));
-    const int width = std::max(1, static_cast<int>(std::ceil(area.x_max / scale)) - left);
-    const int height = std::max(1, top - static_cast<int>(std::floor(area.y_min / scale)));
     const std::vector<Blocker> blockers = blockers_of(model, kBoxGrowShare);
     const std::vector<GroundEye> eyes = eyes_of(model, blockers);
-
     int n_bad = 0;
+    const double scale = scale_of_tiles(model.area, tiles, scale_of(model.area, eyes, options), &n_bad);
+    const Area &area = model.area;
+    const int left = static_cast<int>(std::floor(area.x_min / scale));
+    const int top = static_cast<int>(std::ceil(area.y_max / scale));
+    const int width = std::max(1, static_cast<int>(std::ceil(area.x_max / scale)) - left);
+    const int height = std::max(1, top - static_cast<int>(std::floor(area.y_min / scale)));
+
     std::vector<std::vector<Layer>> layers(model.views.size());
     for (const auto &[key, blob] : tiles) {
         const auto view = std::find_if(model.views.begin(), model.views.end(),
@@ -313,7 +400,7 @@ OverheadMap compose_overhead(const SiteModel &model, const std::map<TileKey, Til
         layer.weight = weigh(key, eyes[static_cast<std::size_t>(layer.view)], scale);
         layers[static_cast<std::size_t>(layer.view)].push_back(std::move(layer));
     }
-    // The view that shows most comes first and sets the exposure.
+    // The view that shows most comes first; the others follow its exposure, and in the end their mean is kept.
     std::vector<std::size_t> order;
     for (std::size_t i = 0; i < layers.size(); i++) {
         if (!layers[i].empty()) order.push_back(i);
@@ -321,19 +408,23 @@ OverheadMap compose_overhead(const SiteModel &model, const std::map<TileKey, Til
     std::stable_sort(order.begin(), order.end(),
                      [&](std::size_t a, std::size_t b) { return layers[a].size() > layers[b].size(); });
     Mosaic mosaic(width, height);
+    double log_gains = 0;
     for (const std::size_t i : order) {
         std::vector<const Layer *> mine;
         for (const Layer &layer : layers[i]) mine.push_back(&layer);
         const double gain = mosaic.gain_of(mine);
         for (const Layer *layer : mine) mosaic.add(*layer, gain);
+        log_gains += static_cast<double>(mine.size()) * std::log(gain);
     }
     OverheadMap map;
     map.metres_per_pixel = scale;
     map.x_min = left * scale;
     map.y_max = top * scale;
-    mosaic.finish(&map);
+    std::size_t n_layers = 0;
+    for (const auto &list : layers) n_layers += list.size();
+    mosaic.finish(n_layers > 0 ? std::exp(-log_gains / static_cast<double>(n_layers)) : 1, &map);
     if (n_bad_tiles) *n_bad_tiles = n_bad;
     return map;
 }
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -14,8 +14,8 @@ namespace outcrop {
 namespace {
 
 constexpr int kIterations = 12;
-constexpr double kShrink = 0.7;         // of the weight's width, per iteration
-constexpr double kFinalWidth = 2.0;     // in standard deviations of a right match
+constexpr double kShrink = 0.7;     // of the weight's width, per iteration
+constexpr double kFinalWidth = 2.0; // in standard deviations of a right match
 
 // m'^T A m and the two line normals that are its gradient.
 struct Residual {
@@ -45,7 +45,7 @@ double median_of(std::vector<double> values)
     return *middle;
 }
 
-}  // namespace
+} // namespace
 
 PairErrors::PairErrors(const oc_pair_t &pair) : pair_(pair) {}
 
@@ -83,7 +83,7 @@ void PairErrors::fit(const std::vector<PixelPair> &matches)
         for (std::size_t i = 0; i < matches.size(); i++) {
             const double left = (distances[i] + slopes[i].dot(mean_)) / width;
             const double keep = 1 / (1 + left * left);
-            const double weight = keep * keep / noise2;  // Geman-McClure
+            const double weight = keep * keep / noise2; // Geman-McClure
             information += weight * slopes[i] * slopes[i].transpose();
             pull -= weight * distances[i] * slopes[i];
         }
@@ -102,4 +102,4 @@ double PairErrors::deviation(const PixelPair &m) const
     return std::abs(distance) / std::sqrt(variance);
 }
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -46,4 +46,4 @@ private:
     Matrix12 covariance_ = Matrix12::Identity();
 };
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -12,13 +12,13 @@ namespace outcrop {
 namespace {
 
 constexpr int kSamplesPerSide = 8;
-constexpr double kParallaxSpread = 0.6;  // in ln(parallax): how fast the worth falls off
+constexpr double kParallaxSpread = 0.6; // in ln(parallax): how fast the worth falls off
 
 // What one view sees of the sample points.
 struct Sight {
     std::vector<char> is_seen;
-    std::vector<Eigen::Vector3d> ray;   // unit, from the point to the camera
-    std::vector<double> metres_per_px;  // at the point
+    std::vector<Eigen::Vector3d> ray;  // unit, from the point to the camera
+    std::vector<double> metres_per_px; // at the point
     int n_seen = 0;
 };
 
@@ -99,7 +99,7 @@ bool is_better(const ViewPair &a, const ViewPair &b)
     return a.left != b.left ? a.left < b.left : a.right < b.right;
 }
 
-}  // namespace
+} // namespace
 
 PosedView as_reported(const View &view)
 {
@@ -140,4 +140,4 @@ std::vector<ViewPair> select_pairs(const std::vector<PosedView> &views, const Ar
     return chosen;
 }
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -22,20 +22,20 @@ struct PosedView {
 PosedView as_reported(const View &view);
 
 struct PairOptions {
-    double min_parallax_rad = 0.087;  // 5 degrees: flatter rays say little about depth
-    double max_parallax_rad = 1.05;   // 60 degrees: corners look too different
-    double best_parallax_rad = 0.40;  // pairs near this angle come first
-    double min_overlap = 0.3;         // of the smaller of the two shares of the area that are seen
-    double max_scale_ratio = 2.5;     // of the pixel sizes at the scene
-    int best_per_view = 6;            // a pair stays if it is among the best of either view
+    double min_parallax_rad = 0.087; // 5 degrees: flatter rays say little about depth
+    double max_parallax_rad = 1.05;  // 60 degrees: corners look too different
+    double best_parallax_rad = 0.40; // pairs near this angle come first
+    double min_overlap = 0.3;        // of the smaller of the two shares of the area that are seen
+    double max_scale_ratio = 2.5;    // of the pixel sizes at the scene
+    int best_per_view = 6;           // a pair stays if it is among the best of either view
 };
 
 // One pair; left and right are indices into the views given, left < right.
 struct ViewPair {
     int left = 0, right = 0;
-    double parallax_rad = 0;  // mean angle between the rays to what both see
+    double parallax_rad = 0; // mean angle between the rays to what both see
     double overlap = 0;
-    double worth = 0;  // larger is better
+    double worth = 0; // larger is better
 };
 
 // Pairs that see the same part of the area (ground up to z_max) from usefully
@@ -46,4 +46,4 @@ struct ViewPair {
 std::vector<ViewPair> select_pairs(const std::vector<PosedView> &views, const Area &area,
                                    const PairOptions &options = {});
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -9,7 +9,6 @@
 
 #include <nlohmann/json.hpp>
 
-
 namespace outcrop {
 namespace {
 
@@ -72,28 +71,78 @@ oc_camera_t camera_at(double x_m, double y_m, double pan_rad, const PathOptions 
     return camera;
 }
 
+// Values of an object, with faults that name the key.
+double number(const json &object, const std::string &key)
+{
+    if (!object.is_object() || !object.contains(key)) throw std::runtime_error("\"" + key + "\" is missing");
+    if (!object[key].is_number()) throw std::runtime_error("\"" + key + "\" is not a number");
+    return object[key].get<double>();
+}
+
+double number_or(const json &object, const std::string &key, double otherwise)
+{
+    return object.contains(key) ? number(object, key) : otherwise;
+}
+
+// Whole and within 0..1e6; narrower ranges are checked where they mean something.
+int whole(const json &object, const std::string &key)
+{
+    const double value = number(object, key);
+    if (!(value >= 0 && value <= 1e6) || value != std::floor(value))
+        throw std::runtime_error("\"" + key + "\" is not a whole number within 0..1000000");
+    return static_cast<int>(value);
+}
+
+int whole_or(const json &object, const std::string &key, int otherwise)
+{
+    return object.contains(key) ? whole(object, key) : otherwise;
+}
+
+void read_numbers(const json &list, const std::string &key, std::size_t n, double *out)
+{
+    if (!list.is_array() || list.size() != n) throw std::runtime_error("\"" + key + "\" has not the right size");
+    for (std::size_t i = 0; i < n; i++) {
+        if (!list[i].is_number()) throw std::runtime_error("\"" + key + "\" holds what is not a number");
+        out[i] = list[i].get<double>();
+    }
+}
+
+const json &list_of(const json &root, const std::string &key)
+{
+    const json &list = root.at(key);
+    if (!list.is_array()) throw std::runtime_error("\"" + key + "\" is not a list");
+    return list;
+}
+
 oc_camera_t read_camera(const json &frame, double metres_per_unit)
 {
     oc_camera_t camera{};
-    camera.k.width_px = frame.at("width").get<std::uint32_t>();
-    camera.k.height_px = frame.at("height").get<std::uint32_t>();
-    camera.k.fx_px = frame.at("fx").get<double>();
-    camera.k.fy_px = frame.at("fy").get<double>();
-    camera.k.cx_px = frame.at("cx").get<double>();
-    camera.k.cy_px = frame.at("cy").get<double>();
-    for (std::size_t i = 0; i < 9; i++) camera.pose.R[i] = frame.at("R").at(i / 3).at(i % 3).get<double>();
-    for (std::size_t i = 0; i < 3; i++) camera.pose.t[i] = frame.at("t").at(i).get<double>() * metres_per_unit;
-    if (!oc_intrinsics_is_valid(&camera.k)) throw std::runtime_error("its intrinsics are out of range");
-    if (!oc_pose_is_valid(&camera.pose)) throw std::runtime_error("\"R\" is not a rotation");
+    camera.k.width_px = static_cast<std::uint32_t>(whole(frame, "width"));
+    camera.k.height_px = static_cast<std::uint32_t>(whole(frame, "height"));
+    camera.k.fx_px = number(frame, "fx");
+    camera.k.fy_px = number(frame, "fy");
+    camera.k.cx_px = number(frame, "cx");
+    camera.k.cy_px = number(frame, "cy");
+    if (!frame.contains("R") || !frame["R"].is_array() || frame["R"].size() != 3)
+        throw std::runtime_error("\"R\" has not the right size");
+    for (std::size_t row = 0; row < 3; row++) read_numbers(frame["R"][row], "R", 3, camera.pose.R + 3 * row);
+    read_numbers(frame.value("t", json()), "t", 3, camera.pose.t);
+    for (double &t : camera.pose.t) t *= metres_per_unit;
+    if (!oc_intrinsics_is_valid(&camera.k))
+        throw std::runtime_error("\"fx\", \"fy\", \"cx\", \"cy\", \"width\" or \"height\" is out of range");
+    if (!oc_pose_is_valid(&camera.pose)) throw std::runtime_error("\"R\" is not a rotation or \"t\" is out of range");
+    double centre[3];
+    oc_pose_centre(&camera.pose, centre);
+    if (!(centre[2] > 0)) throw std::runtime_error("\"R\" and \"t\" put the camera on or under the ground");
     return camera;
 }
 
 Path read_frames(const json &root)
 {
-    const std::string units = root.value("units", "m");
+    const json units = root.value("units", json("m"));
     if (units != "m" && units != "mm") throw std::runtime_error("\"units\" must be \"mm\" or \"m\"");
     Path path;
-    for (const json &frame : root.at("frames")) {
+    for (const json &frame : list_of(root, "frames")) {
         try {
             path.frames.push_back(read_camera(frame, units == "mm" ? 1e-3 : 1));
         } catch (const std::exception &fault) {
@@ -101,33 +150,37 @@ Path read_frames(const json &root)
         }
     }
     if (path.frames.empty() || path.frames.size() > kMaxSteps)
-        throw std::runtime_error("must have 1 to 100000 frames");
+        throw std::runtime_error("\"frames\" must hold 1 to 100000 frames");
     return path;
 }
 
 Path read_waypoints(const json &root)
 {
     std::vector<Waypoint> waypoints;
-    for (const json &item : root.at("waypoints")) {
-        Waypoint w;
-        w.x_m = item.at("x").get<double>();
-        w.y_m = item.at("y").get<double>();
-        w.has_pan = item.contains("pan_deg");
-        if (w.has_pan) w.pan_rad = item["pan_deg"].get<double>() * kDegree;
-        waypoints.push_back(w);
+    for (const json &item : list_of(root, "waypoints")) {
+        try {
+            Waypoint w;
+            w.x_m = number(item, "x");
+            w.y_m = number(item, "y");
+            w.has_pan = item.contains("pan_deg");
+            if (w.has_pan) w.pan_rad = number(item, "pan_deg") * kDegree;
+            waypoints.push_back(w);
+        } catch (const std::exception &fault) {
+            throw std::runtime_error("waypoint " + std::to_string(waypoints.size()) + ": " + fault.what());
+        }
     }
     PathOptions o;
-    o.steps = root.value("steps", o.steps);
-    o.height_m = root.value("height_m", o.height_m);
-    o.tilt_rad = root.value("tilt_deg", 60.0) * kDegree;
-    o.swing_rad = root.value("swing_deg", 0.0) * kDegree;
-    o.hfov_rad = root.value("hfov_deg", 60.0) * kDegree;
-    o.width_px = root.value("width", o.width_px);
-    o.height_px = root.value("height", o.height_px);
+    o.steps = whole_or(root, "steps", o.steps);
+    o.height_m = number_or(root, "height_m", o.height_m);
+    o.tilt_rad = number_or(root, "tilt_deg", 60.0) * kDegree;
+    o.swing_rad = number_or(root, "swing_deg", 0.0) * kDegree;
+    o.hfov_rad = number_or(root, "hfov_deg", 60.0) * kDegree;
+    o.width_px = static_cast<unsigned>(whole_or(root, "width", static_cast<int>(o.width_px)));
+    o.height_px = static_cast<unsigned>(whole_or(root, "height", static_cast<int>(o.height_px)));
     return plan_path(waypoints, o);
 }
 
-}  // namespace
+} // namespace
 
 Path plan_path(const std::vector<Waypoint> &waypoints, const PathOptions &options)
 {
@@ -135,8 +188,8 @@ Path plan_path(const std::vector<Waypoint> &waypoints, const PathOptions &option
     std::vector<double> way{0}, pan;
     for (std::size_t i = 0; i < waypoints.size(); i++) {
         if (i > 0)
-            way.push_back(way.back() + std::hypot(waypoints[i].x_m - waypoints[i - 1].x_m,
-                                                  waypoints[i].y_m - waypoints[i - 1].y_m));
+            way.push_back(way.back() +
+                          std::hypot(waypoints[i].x_m - waypoints[i - 1].x_m, waypoints[i].y_m - waypoints[i - 1].y_m));
         pan.push_back(waypoints[i].has_pan ? waypoints[i].pan_rad : pan_along_motion(waypoints, i));
     }
     Path path;
@@ -149,8 +202,7 @@ Path plan_path(const std::vector<Waypoint> &waypoints, const PathOptions &option
         const double t = length > 0 ? std::clamp((s - way[leg]) / length, 0.0, 1.0) : 0;
         const Waypoint &a = waypoints[leg], &b = waypoints[next];
         const double azimuth = pan[leg] + t * wrapped(pan[next] - pan[leg]);
-        path.frames.push_back(
-            camera_at(a.x_m + t * (b.x_m - a.x_m), a.y_m + t * (b.y_m - a.y_m), azimuth, options));
+        path.frames.push_back(camera_at(a.x_m + t * (b.x_m - a.x_m), a.y_m + t * (b.y_m - a.y_m), azimuth, options));
     }
     return path;
 }
@@ -160,7 +212,8 @@ Path read_path(const std::string &file)
     std::ifstream in(file);
     if (!in) throw std::runtime_error(file + ": cannot be read");
     try {
-        const json root = json::parse(in);
+        const json root = json::parse(in, nullptr, false);
+        if (!root.is_object()) throw std::runtime_error("is not a JSON object");
         if (root.contains("frames")) return read_frames(root);
         if (root.contains("waypoints")) return read_waypoints(root);
         throw std::runtime_error("has neither \"frames\" nor \"waypoints\"");
@@ -192,7 +245,7 @@ Path loop_path(const SiteModel &model, int steps)
     options.tilt_rad = std::atan2(radius, options.height_m - 0.3 * z_max);
     Path path;
     for (int i = 0; i < steps; i++) {
-        const double azimuth = 2 * kPi * i / steps;  // of the place as seen from the centre, clockwise from +Y
+        const double azimuth = 2 * kPi * i / steps; // of the place as seen from the centre, clockwise from +Y
         Waypoint w;
         w.x_m = centre.x() + radius * std::sin(azimuth);
         w.y_m = centre.y() + radius * std::cos(azimuth);
@@ -203,4 +256,4 @@ Path loop_path(const SiteModel &model, int steps)
     return path;
 }
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -18,13 +18,13 @@ struct Path {
 struct Waypoint {
     double x_m = 0, y_m = 0;
     bool has_pan = false;
-    double pan_rad = 0;  // azimuth of the view, clockwise from +Y
+    double pan_rad = 0; // azimuth of the view, clockwise from +Y
 };
 
 struct PathOptions {
-    int steps = 200;          // frames in all, 1..100000
-    double height_m = 0.3;    // of the camera over the ground
-    double tilt_rad = 1.05;   // from nadir
+    int steps = 200;        // frames in all, 1..100000
+    double height_m = 0.3;  // of the camera over the ground
+    double tilt_rad = 1.05; // from nadir
     double swing_rad = 0;
     double hfov_rad = 1.05;
     unsigned width_px = 640, height_px = 480;
@@ -45,4 +45,4 @@ Path read_path(const std::string &file);
 // looks inwards, for a site without a path.
 Path loop_path(const SiteModel &model, int steps = 60);
 
-}  // namespace outcrop
+} // namespace outcrop

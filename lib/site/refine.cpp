@@ -40,10 +40,10 @@ struct Point {
 // What is solved for, per view: moves of the centre and a turn, both zero at the sensor's pose.
 struct PoseState {
     std::array<double, 3> move{0, 0, 0}, turn{0, 0, 0};
-    bool is_held = false;   // margins say that the pose is exact
-    bool is_fixed = false;  // too few sightings: not solved for
+    bool is_held = false;  // margins say that the pose is exact
+    bool is_fixed = false; // too few sightings: not solved for
     int n_sightings = 0;
-    Matrix6d prior = Matrix6d::Identity();  // covariance
+    Matrix6d prior = Matrix6d::Identity(); // covariance
 };
 
 // ---- residuals ----
@@ -54,12 +54,12 @@ struct CameraTerm {
     double x_px, y_px, sigma_px;
 
     template <typename T>
-    bool operator()(const T *move, const T *turn, const T *point, T *residual) const {
+    bool operator()(const T *move, const T *turn, const T *point, T *residual) const
+    {
         const double *r = camera->pose.R;
         T off[3], at_rest[3], in_cam[3];
         for (int i = 0; i < 3; ++i) off[i] = point[i] - centre[i] - move[i];
-        for (int i = 0; i < 3; ++i)
-            at_rest[i] = r[3 * i] * off[0] + r[3 * i + 1] * off[1] + r[3 * i + 2] * off[2];
+        for (int i = 0; i < 3; ++i) at_rest[i] = r[3 * i] * off[0] + r[3 * i + 1] * off[1] + r[3 * i + 2] * off[2];
         ceres::AngleAxisRotatePoint(turn, at_rest, in_cam);
         if (!(in_cam[2] > T(1e-9))) return false;
         residual[0] = (camera->k.fx_px * in_cam[0] / in_cam[2] + camera->k.cx_px - x_px) / sigma_px;
@@ -72,17 +72,19 @@ struct GroundTerm {
     CameraTerm term;
 
     template <typename T>
-    bool operator()(const T *move, const T *turn, const T *xy, T *residual) const {
+    bool operator()(const T *move, const T *turn, const T *xy, T *residual) const
+    {
         const T point[3] = {xy[0], xy[1], T(0)};
         return term(move, turn, point, residual);
     }
 };
 
 struct PriorTerm {
-    Matrix6d root;  // of the information
+    Matrix6d root; // of the information
 
     template <typename T>
-    bool operator()(const T *move, const T *turn, T *residual) const {
+    bool operator()(const T *move, const T *turn, T *residual) const
+    {
         Eigen::Matrix<T, 6, 1> x;
         x << move[0], move[1], move[2], turn[0], turn[1], turn[2];
         Eigen::Map<Eigen::Matrix<T, 6, 1>> out(residual);
@@ -95,13 +97,15 @@ struct FlatTerm {
     double sigma_m;
 
     template <typename T>
-    bool operator()(const T *point, T *residual) const {
+    bool operator()(const T *point, T *residual) const
+    {
         residual[0] = point[2] / sigma_m;
         return true;
     }
 };
 
-oc_camera_t moved(const oc_camera_t &camera, const PoseState &state) {
+oc_camera_t moved(const oc_camera_t &camera, const PoseState &state)
+{
     const Vector3d turn(state.turn[0], state.turn[1], state.turn[2]);
     const double angle = turn.norm();
     const Matrix3d by = angle > 0 ? Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix() : Matrix3d::Identity();
@@ -121,7 +125,8 @@ class TieNodes {
 public:
     TieNodes(std::size_t n_views, double merge_px) : merge_px_(merge_px), of_view_(n_views) {}
 
-    int node(int view, double x_px, double y_px) {
+    int node(int view, double x_px, double y_px)
+    {
         for (const int i : of_view_[static_cast<std::size_t>(view)]) {
             const Pixel &p = pixels_[static_cast<std::size_t>(i)];
             if (std::hypot(p.x_px - x_px, p.y_px - y_px) < merge_px_) return i;
@@ -139,7 +144,8 @@ private:
     std::vector<std::vector<int>> of_view_;
 };
 
-std::vector<Point> points_of_ties(const std::vector<View> &views, double merge_px) {
+std::vector<Point> points_of_ties(const std::vector<View> &views, double merge_px)
+{
     std::map<int, int> index;
     for (std::size_t i = 0; i < views.size(); ++i) index[views[i].id] = static_cast<int>(i);
     TieNodes nodes(views.size(), merge_px);
@@ -148,10 +154,10 @@ std::vector<Point> points_of_ties(const std::vector<View> &views, double merge_p
         for (const oc_tie_t &tie : views[i].ties) {
             const auto ref = index.find(tie.ref_view);
             if (ref == index.end() || ref->second == static_cast<int>(i)) continue;
-            const int own = nodes.node(static_cast<int>(i), static_cast<double>(tie.x_px),
-                                       static_cast<double>(tie.y_px));
-            const int other = nodes.node(ref->second, static_cast<double>(tie.ref_x_px),
-                                         static_cast<double>(tie.ref_y_px));
+            const int own =
+                nodes.node(static_cast<int>(i), static_cast<double>(tie.x_px), static_cast<double>(tie.y_px));
+            const int other =
+                nodes.node(ref->second, static_cast<double>(tie.ref_x_px), static_cast<double>(tie.ref_y_px));
             edges.emplace_back(own, other);
         }
     }
@@ -170,7 +176,8 @@ std::vector<Point> points_of_ties(const std::vector<View> &views, double merge_p
     return points;
 }
 
-std::vector<Point> points_of_tracks(const std::vector<View> &views, const std::vector<Track> &tracks) {
+std::vector<Point> points_of_tracks(const std::vector<View> &views, const std::vector<Track> &tracks)
+{
     std::vector<Point> points;
     for (const Track &track : tracks) {
         Point point;
@@ -189,7 +196,8 @@ std::vector<Point> points_of_tracks(const std::vector<View> &views, const std::v
 
 class Adjustment {
 public:
-    Adjustment(const std::vector<View> &views, const RefineOptions &options) : views_(views), options_(options) {
+    Adjustment(const std::vector<View> &views, const RefineOptions &options) : views_(views), options_(options)
+    {
         for (const View &view : views) {
             PoseState state;
             state.is_held = true;
@@ -202,9 +210,15 @@ public:
         }
     }
 
-    void add(std::vector<Point> points) {
+    void add(std::vector<Point> points)
+    {
+        std::vector<Point> placed;
         for (Point &point : points)
-            if (place(&point)) points_.push_back(std::move(point));
+            if (place(&point)) placed.push_back(std::move(point));
+        std::stable_sort(placed.begin(), placed.end(),
+                         [](const Point &a, const Point &b) { return a.pixels.size() > b.pixels.size(); });
+        for (Point &point : placed)
+            if (is_wanted(point)) points_.push_back(std::move(point));
     }
 
     bool solve();
@@ -212,8 +226,7 @@ public:
     void fill(RefineResult *result) const;
 
 private:
-    using Blocks = std::map<std::pair<int, int>, Matrix6d>;
-
+    bool is_wanted(const Point &point);
     bool place(Point *point) const;
     void count_sightings();
     void add_point(Point *point, ceres::Problem *problem, ceres::LossFunction *loss);
@@ -230,13 +243,15 @@ private:
     const RefineOptions &options_;
     std::vector<PoseState> states_;
     std::vector<Vector3d> centres_;
-    std::vector<oc_camera_t> cameras_;  // as refined so far
+    std::vector<oc_camera_t> cameras_; // as refined so far
     std::vector<Point> points_;
+    std::map<std::pair<bool, int>, int> n_taken_; // sightings by kind (ground) and view
     bool is_solved_ = false;
 };
 
 // Nearest point of the rays, or the mean of where they meet the ground. False when it is not in front of all.
-Vector3d Adjustment::replaced(const Point &point, const std::vector<oc_camera_t> &cameras) const {
+Vector3d Adjustment::replaced(const Point &point, const std::vector<oc_camera_t> &cameras) const
+{
     const Vector3d nowhere = Vector3d::Constant(std::nan(""));
     if (!point.is_ground) {
         std::vector<Sighting> sightings;
@@ -256,7 +271,7 @@ Vector3d Adjustment::replaced(const Point &point, const std::vector<oc_camera_t>
         const Vector3d centre = camera_centre(camera);
         const double reach = -centre.z() / ray.z();
         if (!(reach > 0) || !std::isfinite(reach)) return nowhere;
-        const double weight = ray.z() * ray.z() / (reach * reach);  // flat and far rays say little
+        const double weight = ray.z() * ray.z() / (reach * reach); // flat and far rays say little
         sum += weight * (centre + reach * ray);
         weights += weight;
     }
@@ -265,7 +280,19 @@ Vector3d Adjustment::replaced(const Point &point, const std::vector<oc_camera_t>
     return sum;
 }
 
-bool Adjustment::place(Point *point) const {
+// Has a view of the point too few sightings of its kind? Counts it if so.
+bool Adjustment::is_wanted(const Point &point)
+{
+    bool is_wanted = options_.sightings_per_view == 0;
+    for (const Pixel &p : point.pixels)
+        is_wanted = is_wanted || n_taken_[{point.is_ground, p.view}] < options_.sightings_per_view;
+    if (!is_wanted) return false;
+    for (const Pixel &p : point.pixels) ++n_taken_[{point.is_ground, p.view}];
+    return true;
+}
+
+bool Adjustment::place(Point *point) const
+{
     point->position = replaced(*point, cameras_);
     if (!point->position.allFinite()) return false;
     for (const Pixel &p : point->pixels)
@@ -275,14 +302,16 @@ bool Adjustment::place(Point *point) const {
     return true;
 }
 
-void Adjustment::count_sightings() {
+void Adjustment::count_sightings()
+{
     for (PoseState &state : states_) state.n_sightings = 0;
     for (const Point &point : points_)
         for (const Pixel &p : point.pixels) ++states_[static_cast<std::size_t>(p.view)].n_sightings;
     for (PoseState &state : states_) state.is_fixed = state.is_held || state.n_sightings < options_.min_sightings;
 }
 
-void Adjustment::add_point(Point *point, ceres::Problem *problem, ceres::LossFunction *loss) {
+void Adjustment::add_point(Point *point, ceres::Problem *problem, ceres::LossFunction *loss)
+{
     double *position = point->position.data();
     const bool is_flat = point->is_ground && !(options_.ground_sigma_m > 0);
     for (const Pixel &p : point->pixels) {
@@ -300,7 +329,8 @@ void Adjustment::add_point(Point *point, ceres::Problem *problem, ceres::LossFun
             new ceres::AutoDiffCostFunction<FlatTerm, 1, 3>(new FlatTerm{options_.ground_sigma_m}), nullptr, position);
 }
 
-void Adjustment::add_priors(ceres::Problem *problem) {
+void Adjustment::add_priors(ceres::Problem *problem)
+{
     for (PoseState &state : states_) {
         if (state.n_sightings == 0) continue;
         if (state.is_fixed) {
@@ -310,12 +340,13 @@ void Adjustment::add_priors(ceres::Problem *problem) {
         }
         const Matrix6d lower = state.prior.llt().matrixL();
         PriorTerm *term = new PriorTerm{lower.triangularView<Eigen::Lower>().solve(Matrix6d::Identity())};
-        problem->AddResidualBlock(new ceres::AutoDiffCostFunction<PriorTerm, 6, 3, 3>(term), nullptr,
-                                  state.move.data(), state.turn.data());
+        problem->AddResidualBlock(new ceres::AutoDiffCostFunction<PriorTerm, 6, 3, 3>(term), nullptr, state.move.data(),
+                                  state.turn.data());
     }
 }
 
-bool Adjustment::solve() {
+bool Adjustment::solve()
+{
     count_sightings();
     if (points_.empty()) return false;
     ceres::Problem::Options problem_options;
@@ -353,7 +384,8 @@ bool Adjustment::solve() {
 }
 
 double Adjustment::residual_sigmas(const Pixel &pixel, const Vector3d &position,
-                                   const std::vector<oc_camera_t> &cameras) const {
+                                   const std::vector<oc_camera_t> &cameras) const
+{
     Vector2d projected;
     if (!project_with_derivatives(cameras[static_cast<std::size_t>(pixel.view)], position, &projected, nullptr,
                                   nullptr))
@@ -361,7 +393,8 @@ double Adjustment::residual_sigmas(const Pixel &pixel, const Vector3d &position,
     return (Vector2d(pixel.x_px, pixel.y_px) - projected).norm() / options_.sigma_px;
 }
 
-int Adjustment::reject() {
+int Adjustment::reject()
+{
     int n_rejected = 0;
     std::vector<Point> kept;
     for (Point &point : points_) {
@@ -378,8 +411,8 @@ int Adjustment::reject() {
 }
 
 // Robust cost per view, and the RMS pixel error of all sightings.
-std::vector<double> Adjustment::costs(const std::vector<oc_camera_t> &cameras, bool replace_points,
-                                      double *rms) const {
+std::vector<double> Adjustment::costs(const std::vector<oc_camera_t> &cameras, bool replace_points, double *rms) const
+{
     std::vector<double> cost(views_.size(), 0);
     double sum = 0;
     int n = 0;
@@ -398,7 +431,8 @@ std::vector<double> Adjustment::costs(const std::vector<oc_camera_t> &cameras, b
     return cost;
 }
 
-std::vector<int> Adjustment::free_views() const {
+std::vector<int> Adjustment::free_views() const
+{
     std::vector<int> free;
     for (std::size_t i = 0; i < states_.size(); ++i)
         if (!states_[i].is_fixed) free.push_back(static_cast<int>(i));
@@ -406,7 +440,8 @@ std::vector<int> Adjustment::free_views() const {
 }
 
 // Information of the free poses once the points are marginalised (Schur complement), robust weights included.
-Eigen::MatrixXd Adjustment::information(const std::vector<int> &free) const {
+Eigen::MatrixXd Adjustment::information(const std::vector<int> &free) const
+{
     std::vector<int> slot(views_.size(), -1);
     for (std::size_t i = 0; i < free.size(); ++i) slot[static_cast<std::size_t>(free[i])] = static_cast<int>(i);
     Eigen::MatrixXd total = Eigen::MatrixXd::Zero(6 * static_cast<int>(free.size()), 6 * static_cast<int>(free.size()));
@@ -425,8 +460,8 @@ Eigen::MatrixXd Adjustment::information(const std::vector<int> &free) const {
             Vector2d pixel;
             Eigen::Matrix<double, 2, 3> by_point;
             Matrix26d by_pose;
-            if (!project_with_derivatives(cameras_[static_cast<std::size_t>(p.view)], point.position, &pixel,
-                                          &by_point, &by_pose))
+            if (!project_with_derivatives(cameras_[static_cast<std::size_t>(p.view)], point.position, &pixel, &by_point,
+                                          &by_pose))
                 continue;
             const double r = residual_sigmas(p, point.position, cameras_);
             const double weight = 1.0 / (1.0 + r * r / scale) / (options_.sigma_px * options_.sigma_px);
@@ -439,14 +474,14 @@ Eigen::MatrixXd Adjustment::information(const std::vector<int> &free) const {
         const Matrix3d inverse = own.inverse();
         if (!inverse.allFinite()) continue;
         for (const auto &[a, left] : cross)
-            for (const auto &[b, right] : cross)
-                total.block<6, 6>(6 * a, 6 * b) -= left * inverse * right.transpose();
+            for (const auto &[b, right] : cross) total.block<6, 6>(6 * a, 6 * b) -= left * inverse * right.transpose();
     }
     return total;
 }
 
 // Takes out what moves all cameras alike over the plane (X, Y, yaw): it changes no picture.
-Eigen::MatrixXd Adjustment::without_gauge(const std::vector<int> &free, const Eigen::MatrixXd &covariance) const {
+Eigen::MatrixXd Adjustment::without_gauge(const std::vector<int> &free, const Eigen::MatrixXd &covariance) const
+{
     const int n = static_cast<int>(free.size());
     Vector3d mean = Vector3d::Zero();
     for (const int view : free) mean += camera_centre(cameras_[static_cast<std::size_t>(view)]) / n;
@@ -469,7 +504,8 @@ Eigen::MatrixXd Adjustment::without_gauge(const std::vector<int> &free, const Ei
 // Above so many views the joint covariance is not worth its cubic cost; each view is then taken alone.
 constexpr std::size_t kMaxJointViews = 200;
 
-void Adjustment::fill_view(std::size_t i, double cost_before, double cost_after, RefineResult *result) const {
+void Adjustment::fill_view(std::size_t i, double cost_before, double cost_after, RefineResult *result) const
+{
     const Matrix6d &posterior = result->pose_covariances[i];
     const Matrix6d &relative = result->relative_covariances[i];
     RefinedView view;
@@ -492,7 +528,8 @@ void Adjustment::fill_view(std::size_t i, double cost_before, double cost_after,
     result->matching_margins.push_back(matching);
 }
 
-void Adjustment::fill(RefineResult *result) const {
+void Adjustment::fill(RefineResult *result) const
+{
     result->pose_covariances.clear();
     for (const PoseState &state : states_)
         result->pose_covariances.push_back(state.is_held ? Matrix6d(Matrix6d::Zero()) : state.prior);
@@ -509,8 +546,8 @@ void Adjustment::fill(RefineResult *result) const {
         for (std::size_t i = 0; i < free.size(); ++i) {
             const int at = 6 * static_cast<int>(i);
             const std::size_t view = static_cast<std::size_t>(free[i]);
-            const Matrix6d alone = is_joint ? Matrix6d(joint.block<6, 6>(at, at))
-                                            : Matrix6d(total.block<6, 6>(at, at).inverse());
+            const Matrix6d alone =
+                is_joint ? Matrix6d(joint.block<6, 6>(at, at)) : Matrix6d(total.block<6, 6>(at, at).inverse());
             if (!alone.allFinite()) continue;
             result->pose_covariances[view] = alone;
             result->relative_covariances[view] = is_joint ? Matrix6d(relative.block<6, 6>(at, at)) : alone;
@@ -524,17 +561,20 @@ void Adjustment::fill(RefineResult *result) const {
     for (const Point &point : points_) ++(point.is_ground ? result->n_ground : result->n_points);
 }
 
-}  // namespace
+} // namespace
 
-void RefineOptions::check() const {
+void RefineOptions::check() const
+{
     if (!(sigma_px > 0) || !(loss_sigmas > 0) || !(reject_sigmas > 0) || !(exact_sigma > 0) || !(tie_merge_px > 0))
         throw std::invalid_argument("refine: sigmas and distances must be > 0");
+    if (sightings_per_view < 0) throw std::invalid_argument("refine: sightings_per_view must be >= 0");
     if (!(ground_sigma_m >= 0) || max_iterations < 1 || min_sightings < 1)
         throw std::invalid_argument("refine: ground_sigma_m must be >= 0, counts >= 1");
 }
 
 RefineResult refine_poses(const std::vector<View> &views, const std::vector<Track> &tracks,
-                          const RefineOptions &options) {
+                          const RefineOptions &options)
+{
     options.check();
     RefineResult result;
     Adjustment adjustment(views, options);
@@ -548,4 +588,4 @@ RefineResult refine_poses(const std::vector<View> &views, const std::vector<Trac
     return result;
 }
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -10,17 +10,19 @@
 namespace outcrop {
 
 struct RefineOptions {
-    double sigma_px = 0.7;          // of a pixel coordinate; scale of the loss
-    double loss_sigmas = 2.0;       // Cauchy's scale in sigmas
-    double reject_sigmas = 4.0;     // sightings with larger residuals leave before the second solve
-    double ground_sigma_m = 0;      // 0: ground points have no Z at all; else Z / sigma is a residual
-    double tie_merge_px = 1.0;      // ties nearer than this in one view are one point
-    double exact_sigma = 1e-6;      // a margin below it (metres, radians) is exact: the parameter's view is held
-    int max_iterations = 40;        // per solve
-    int min_sightings = 6;          // a view with fewer keeps the sensor's pose
+    double sigma_px = 0.7;       // of a pixel coordinate; scale of the loss
+    double loss_sigmas = 2.0;    // Cauchy's scale in sigmas
+    double reject_sigmas = 4.0;  // sightings with larger residuals leave before the second solve
+    double ground_sigma_m = 0;   // 0: ground points have no Z at all; else Z / sigma is a residual
+    double tie_merge_px = 1.0;   // ties nearer than this in one view are one point
+    double exact_sigma = 1e-6;   // a margin below it (metres, radians) is exact: the parameter's view is held
+    int max_iterations = 40;     // per solve
+    int min_sightings = 6;       // a view with fewer keeps the sensor's pose
+    int sightings_per_view = 80; // of the ground and of obstacles each that are enough: points seen most often come
+                                 // first, others only while a view of theirs has fewer. 0: all
     bool use_ties = true;
     bool use_tracks = true;
-    void check() const;  // throws std::invalid_argument
+    void check() const; // throws std::invalid_argument
 };
 
 struct RefineResult {
@@ -28,12 +30,13 @@ struct RefineResult {
     std::vector<Matrix6d> pose_covariances;     // posterior of (centre, rotation vector), gauge included
     std::vector<Matrix6d> relative_covariances; // the same without what moves all cameras alike (X, Y, yaw):
                                                 // what matching and consistency between views need
-    std::vector<oc_margin_t> matching_margins;  // half-widths for the next matching pass, from relative_covariances;
-                                                // the angles are turns about the camera's own axes
-                                                // (OC_ANGLE_ERROR_LOCAL)
-    int n_ground = 0, n_points = 0;             // tracks in the last solve
-    int n_rejected = 0;                         // sightings left out
-    double rms_before_px = 0, rms_after_px = 0; // of the sightings of the last solve, at the sensor's and the final poses
+    // Half-widths for the next matching pass, from relative_covariances; the angles are turns about the camera's own
+    // axes (OC_ANGLE_ERROR_LOCAL).
+    std::vector<oc_margin_t> matching_margins;
+    int n_ground = 0, n_points = 0; // tracks in the last solve
+    int n_rejected = 0;             // sightings left out
+    // Of the sightings of the last solve, at the sensor's and at the final poses.
+    double rms_before_px = 0, rms_after_px = 0;
 };
 
 // Parameters: per view the centre (3) and a local rotation vector (3); per obstacle track a point (3); per ground
@@ -47,4 +50,4 @@ struct RefineResult {
 RefineResult refine_poses(const std::vector<View> &views, const std::vector<Track> &tracks,
                           const RefineOptions &options = {});
 
-}  // namespace outcrop
+} // namespace outcrop

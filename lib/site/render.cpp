@@ -1,181 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Sky, ground, boxes.
+// Boxes first, ground where no box covers it, then the outlines of the boxes with several samples a pixel.
 #include "site/render.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
-#include <Eigen/Core>
-
 #include "core/plane.h"
+#include "site/render_box.h"
 
 namespace outcrop {
 namespace {
 
 const cv::Vec3f kSkyTop(150, 178, 208), kSkyLow(222, 229, 236);
-const cv::Vec3f kUnseenDark(112, 112, 116), kUnseenLight(140, 140, 144);
-const cv::Vec3f kSuspected(240, 170, 30);
 
-// Distinct on grey ground and in the sun.
-const std::array<cv::Vec3f, 8> kPalette = {cv::Vec3f(214, 92, 66),  cv::Vec3f(58, 128, 196), cv::Vec3f(232, 178, 58),
-                                           cv::Vec3f(92, 160, 88),  cv::Vec3f(150, 102, 178), cv::Vec3f(72, 172, 172),
-                                           cv::Vec3f(204, 120, 150), cv::Vec3f(150, 130, 90)};
-
-// Light from the upper left of a north-up map.
-const Eigen::Vector3d kLight = Eigen::Vector3d(-0.45, 0.35, 0.82).normalized();
-
-struct Ray {
-    Eigen::Vector3d from, along;  // along has z-depth 1 in the camera, so t is z-depth
-};
-
-class Viewer {
-public:
-    explicit Viewer(const oc_camera_t &camera) : camera_(camera)
-    {
-        double centre[3];
-        oc_pose_centre(&camera.pose, centre);
-        centre_ = Eigen::Vector3d(centre[0], centre[1], centre[2]);
-    }
-
-    Ray ray(double x, double y) const
-    {
-        const oc_intrinsics_t &k = camera_.k;
-        const double a = (x - k.cx_px) / k.fx_px, b = (y - k.cy_px) / k.fy_px;
-        const double *R = camera_.pose.R;
-        return {centre_, {R[0] * a + R[3] * b + R[6], R[1] * a + R[4] * b + R[7], R[2] * a + R[5] * b + R[8]}};
-    }
-
-    const Eigen::Vector3d &centre() const { return centre_; }
-
-private:
-    oc_camera_t camera_;
-    Eigen::Vector3d centre_;
-};
-
-// A box made ready for rays.
-struct Box {
-    int index = 0;
-    bool is_suspected = false;
-    double c = 1, s = 0;
-    Eigen::Vector3d centre, half;
-    cv::Vec3f colour;
-    cv::Rect reach;  // pixels that may show it
-};
-
-struct Hit {
-    bool is_hit = false;
-    double depth = 0;
-    int axis = 0;
-    double sign = 1;
-    Eigen::Vector3d at;  // in the box's frame
-};
-
-Eigen::Vector3d into_box(const Box &box, const Eigen::Vector3d &v)
-{
-    return {box.c * v.x() + box.s * v.y(), -box.s * v.x() + box.c * v.y(), v.z()};
-}
-
-Hit intersect(const Box &box, const Ray &ray, double near_m)
-{
-    const Eigen::Vector3d from = into_box(box, ray.from - box.centre), along = into_box(box, ray.along);
-    double enter = near_m, leave = std::numeric_limits<double>::infinity();
-    int axis = -1;
-    double sign = 1;
-    for (int i = 0; i < 3; i++) {
-        if (along[i] == 0) {
-            if (std::abs(from[i]) > box.half[i]) return {};
-            continue;
-        }
-        const double side = along[i] > 0 ? -1 : 1;  // of the face that is entered
-        const double t_in = (side * box.half[i] - from[i]) / along[i], t_out = (-side * box.half[i] - from[i]) / along[i];
-        if (t_in > enter) {
-            enter = t_in;
-            axis = i;
-            sign = side;
-        }
-        leave = std::min(leave, t_out);
-    }
-    if (enter > leave) return {};
-    Hit hit;
-    hit.is_hit = true;
-    hit.depth = enter;
-    hit.axis = axis;  // -1: the camera is inside
-    hit.sign = sign;
-    hit.at = from + enter * along;
-    return hit;
-}
-
-cv::Vec3f shade(const Box &box, const Hit &hit, double pixel_m)
-{
-    if (hit.axis < 0) return 0.35f * box.colour;
-    Eigen::Vector3d normal = Eigen::Vector3d::Zero();
-    normal[hit.axis] = hit.sign;
-    const Eigen::Vector3d in_world(box.c * normal.x() - box.s * normal.y(), box.s * normal.x() + box.c * normal.y(),
-                                   normal.z());
-    const double light = 0.55 + 0.45 * std::max(0.0, in_world.dot(kLight)) + 0.08 * in_world.y();
-    double edge = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < 3; i++) {
-        if (i != hit.axis) edge = std::min(edge, box.half[i] - std::abs(hit.at[i]));
-    }
-    // Lines of about a pixel and a half along the edges.
-    const double line = 0.55 + 0.45 * std::clamp((edge / pixel_m - 0.8) / 1.0, 0.0, 1.0);
-    return static_cast<float>(light * line) * box.colour;
-}
-
-cv::Rect reach_of(const Box &box, const oc_camera_t &camera, double near_m)
-{
-    const int width = static_cast<int>(camera.k.width_px), height = static_cast<int>(camera.k.height_px);
-    double x0 = 1e9, y0 = 1e9, x1 = -1e9, y1 = -1e9;
-    for (int corner = 0; corner < 8; corner++) {
-        const double a = (corner & 1 ? 1 : -1) * box.half.x(), b = (corner & 2 ? 1 : -1) * box.half.y();
-        const double p[3] = {box.centre.x() + box.c * a - box.s * b, box.centre.y() + box.s * a + box.c * b,
-                             box.centre.z() + (corner & 4 ? 1 : -1) * box.half.z()};
-        double u = 0, v = 0;
-        if (!(oc_camera_project(&camera, p, &u, &v) > near_m)) return {0, 0, width, height};
-        x0 = std::min(x0, u);
-        x1 = std::max(x1, u);
-        y0 = std::min(y0, v);
-        y1 = std::max(y1, v);
-    }
-    const auto clip = [](double v, int side) { return static_cast<int>(std::clamp(v, -1.0, side + 1.0)); };
-    const cv::Point low(clip(std::floor(x0) - 1, width), clip(std::floor(y0) - 1, height));
-    const cv::Point high(clip(std::ceil(x1) + 2, width), clip(std::ceil(y1) + 2, height));
-    return cv::Rect(low, high) & cv::Rect(0, 0, width, height);
-}
-
-std::vector<Box> boxes_of(const SiteModel &model, const oc_camera_t &camera, double near_m)
-{
-    std::vector<Box> out;
-    for (const auto *list : {&model.obstacles, &model.suspected}) {
-        for (const Obstacle &o : *list) {
-            Box box;
-            box.index = o.index;
-            box.is_suspected = list == &model.suspected;
-            box.c = std::cos(o.yaw_rad);
-            box.s = std::sin(o.yaw_rad);
-            box.centre = o.obb_centre;
-            box.half = 0.5 * o.obb_size;
-            box.colour = box.is_suspected ? kSuspected : kPalette[static_cast<std::size_t>(o.index - 1) % kPalette.size()];
-            box.reach = reach_of(box, camera, near_m);
-            out.push_back(box);
-        }
-    }
-    return out;
-}
-
-// Stripes fixed to the ground; they melt into their mean where a pixel covers more than a stripe.
-cv::Vec3f hatch(double x, double y, double period_m, double footprint_m)
-{
-    const double phase = (x + y) / (period_m * std::sqrt(2.0));
-    const double wave = std::sin(2 * 3.14159265358979323846 * phase);
-    const double contrast = std::clamp(1.5 - 2 * footprint_m / period_m, 0.0, 1.0);
-    const double stripe = std::clamp(wave * period_m / (4 * std::max(footprint_m, 1e-9)), -1.0, 1.0);
-    const auto mix = static_cast<float>(0.5 + 0.5 * contrast * stripe);
-    return (1 - mix) * kUnseenDark + mix * kUnseenLight;
-}
+// Unseen ground fades into the sky's edge over this share of the image's height.
+constexpr double kHazeShare = 0.04;
 
 cv::Vec3f sky(double y, double horizon_y, double height)
 {
@@ -183,103 +23,167 @@ cv::Vec3f sky(double y, double horizon_y, double height)
     return (1 - t) * kSkyLow + t * kSkyTop;
 }
 
-// Where the horizon crosses a column, or far below when the camera only looks down.
-double horizon_at(const double line[3], double x, double height)
-{
-    if (std::abs(line[1]) < 1e-15) return height;
-    return std::clamp(-(line[0] * x + line[2]) / line[1], -4 * height, 4 * height);
-}
+// Ground and sky, pixel by pixel.
+class Backdrop {
+public:
+    Backdrop(const GroundTexture &ground, const oc_camera_t &camera, int max_anisotropy)
+        : ground_(ground), height_(camera.k.height_px), max_anisotropy_(max_anisotropy)
+    {
+        if (oc_plane_ground_from_image(&camera, G_) != OC_OK)
+            throw std::invalid_argument("the virtual camera does not stand above the ground");
+        oc_plane_horizon(G_, line_);
+        slope_ = std::hypot(line_[0], line_[1]);
+    }
 
-void draw_ground(const GroundTexture &ground, const oc_camera_t &camera, const RenderOptions &options, Frame *frame)
-{
-    double G[9], line[3];
-    if (oc_plane_ground_from_image(&camera, G) != OC_OK)
-        throw std::invalid_argument("the virtual camera does not stand above the ground");
-    oc_plane_horizon(G, line);
-    const double height = camera.k.height_px;
-    for (int y = 0; y < frame->rgb.rows; y++) {
-        for (int x = 0; x < frame->rgb.cols; x++) {
-            const double w = G[6] * x + G[7] * y + G[8];
-            if (!(w > 0)) {
-                const cv::Vec3f c = sky(y, horizon_at(line, x, height), height);
-                frame->rgb(y, x) = cv::Vec3b(c);
-                frame->mask(y, x) = kMaskSky;
+    // False for sky.
+    bool is_ground(double x, double y) const { return G_[6] * x + G_[7] * y + G_[8] > 0; }
+
+    cv::Vec3f colour(double x, double y) const
+    {
+        const double w = G_[6] * x + G_[7] * y + G_[8];
+        if (!(w > 0)) return sky(y, horizon_at(x), height_);
+        const double inverse = 1 / w;
+        const double gx = (G_[0] * x + G_[1] * y + G_[2]) * inverse, gy = (G_[3] * x + G_[4] * y + G_[5]) * inverse;
+        // Derivatives of the ground point: one pixel right, one pixel down.
+        const cv::Vec2d du((G_[0] - gx * G_[6]) * inverse, (G_[3] - gy * G_[6]) * inverse);
+        const cv::Vec2d dv((G_[1] - gx * G_[7]) * inverse, (G_[4] - gy * G_[7]) * inverse);
+        const cv::Vec4f seen = ground_.sample(gx, gy, du, dv, max_anisotropy_);
+        const cv::Vec3f shown(seen[0], seen[1], seen[2]);
+        if (seen[3] >= 1) return shown;
+        const double footprint = std::sqrt(std::max(du.dot(du), dv.dot(dv)));
+        const double below_px = slope_ > 0 ? w / slope_ : height_;
+        const auto haze = static_cast<float>(std::clamp(1 - below_px / (kHazeShare * height_), 0.0, 1.0));
+        const cv::Vec3f unseen = (1 - haze) * ground_.hatch(gx, gy, footprint) + haze * kSkyLow;
+        return seen[3] * shown + (1 - seen[3]) * unseen;
+    }
+
+private:
+    // Row where the horizon crosses a column, or far below when the camera only looks down or up.
+    double horizon_at(double x) const
+    {
+        if (std::abs(line_[1]) < 1e-15) return height_;
+        return std::clamp(-(line_[0] * x + line_[2]) / line_[1], -4 * height_, 4 * height_);
+    }
+
+    const GroundTexture &ground_;
+    double G_[9], line_[3], slope_ = 0, height_;
+    int max_anisotropy_;
+};
+
+// What stands along a ray: the nearest firm box, and whether a suspected one is before it.
+struct Sight {
+    const BoxView *firm = nullptr;
+    BoxHit hit;
+    bool has_suspected = false;
+};
+
+class Painter {
+public:
+    Painter(const SiteModel &model, const Backdrop &backdrop, const oc_camera_t &camera, const RenderOptions &options)
+        : backdrop_(backdrop), options_(options), boxes_(see_boxes(model, camera, options.near_m)),
+          faces_(static_cast<int>(camera.k.height_px), static_cast<int>(camera.k.width_px), 0)
+    {}
+
+    void draw(Frame *frame)
+    {
+        for (int y = 0; y < faces_.rows; y++) draw_centres(y, frame);
+        for (int y = 0; y < faces_.rows; y++) {
+            for (int x = 0; x < faces_.cols; x++) {
+                if (is_uniform(x, y, kFirstFace)) continue;
+                frame->rgb(y, x) = cv::Vec3b(is_uniform(x, y, kNone) ? backdrop_.colour(x, y) : blended(x, y));
+            }
+        }
+    }
+
+private:
+    // Values of faces_: the backdrop, a suspected box; from kFirstFace on: one face of one firm box.
+    static constexpr int kNone = 0, kSuspectedFace = 1, kFirstFace = 2;
+
+    Sight look(double x, double y, int pixel_x, int pixel_y) const
+    {
+        Sight sight;
+        for (const BoxView &box : boxes_) {
+            if (!box.reach().contains({pixel_x, pixel_y})) continue;
+            const BoxHit hit = box.hit(x, y);
+            if (!hit.is_hit || (sight.firm && hit.depth_m >= sight.hit.depth_m)) continue;
+            if (box.is_suspected()) {
+                sight.has_suspected = true;
                 continue;
             }
-            const double gx = (G[0] * x + G[1] * y + G[2]) / w, gy = (G[3] * x + G[4] * y + G[5]) / w;
-            // Derivatives of the ground point: one pixel right, one pixel down.
-            const cv::Vec2d du((G[0] - gx * G[6]) / w, (G[3] - gy * G[6]) / w);
-            const cv::Vec2d dv((G[1] - gx * G[7]) / w, (G[4] - gy * G[7]) / w);
-            const cv::Vec4f seen = ground.sample(gx, gy, du, dv, options.max_anisotropy);
-            cv::Vec3f c(seen[0], seen[1], seen[2]);
-            if (seen[3] < 1) {
-                const double footprint = std::max(cv::norm(du), cv::norm(dv));
-                c = seen[3] * c + (1 - seen[3]) * hatch(gx, gy, ground.hatch_period_m(), footprint);
-            }
-            frame->rgb(y, x) = cv::Vec3b(c);
+            sight.firm = &box;
+            sight.hit = hit;
+        }
+        return sight;
+    }
+
+    int face_of(const Sight &sight) const
+    {
+        if (sight.has_suspected) return kSuspectedFace;
+        if (!sight.firm) return kNone;
+        const int box = static_cast<int>(sight.firm - boxes_.data());
+        return kFirstFace + 8 * box + 2 * (sight.hit.axis + 1) + (sight.hit.sign > 0 ? 1 : 0);
+    }
+
+    // Mask and faces at the pixels' centres, and the faces' colour there.
+    void draw_centres(int y, Frame *frame)
+    {
+        int from = faces_.cols, to = 0;
+        for (const BoxView &box : boxes_) {
+            if (y < box.reach().y || y >= box.reach().br().y) continue;
+            from = std::min(from, box.reach().x);
+            to = std::max(to, box.reach().br().x);
+        }
+        for (int x = 0; x < faces_.cols; x++) frame->mask(y, x) = backdrop_.is_ground(x, y) ? kMaskGround : kMaskSky;
+        for (int x = from; x < to; x++) {
+            const Sight sight = look(x, y, x, y);
+            faces_(y, x) = face_of(sight);
+            if (!sight.firm) continue;
+            frame->mask(y, x) = static_cast<unsigned char>(std::clamp(sight.firm->index(), 1, 253));
+            if (!sight.has_suspected) frame->rgb(y, x) = cv::Vec3b(sight.firm->shade(sight.hit));
         }
     }
-}
 
-// The colour that boxes give a sample, over what is behind; index is that of the nearest firm box.
-cv::Vec3f through_boxes(const std::vector<const Box *> &boxes, const Ray &ray, double pixel_per_depth, double near_m,
-                        const cv::Vec3f &behind, int *index)
-{
-    const Box *nearest = nullptr;
-    Hit nearest_hit;
-    for (const Box *box : boxes) {
-        if (box->is_suspected) continue;
-        const Hit hit = intersect(*box, ray, near_m);
-        if (!hit.is_hit || (nearest && hit.depth >= nearest_hit.depth)) continue;
-        nearest = box;
-        nearest_hit = hit;
+    // Are this pixel and its neighbours all on one face? least kFirstFace: of a firm box, so what draw_centres drew
+    // stays; least kNone: of one or of the backdrop.
+    bool is_uniform(int x, int y, int least) const
+    {
+        const int face = faces_(y, x);
+        if (face < least || face == kSuspectedFace) return false;
+        return (x == 0 || faces_(y, x - 1) == face) && (x + 1 == faces_.cols || faces_(y, x + 1) == face) &&
+               (y == 0 || faces_(y - 1, x) == face) && (y + 1 == faces_.rows || faces_(y + 1, x) == face);
     }
-    cv::Vec3f colour = behind;
-    *index = 0;
-    if (nearest) {
-        colour = shade(*nearest, nearest_hit, nearest_hit.depth * pixel_per_depth);
-        *index = nearest->index;
-    }
-    for (const Box *box : boxes) {
-        if (!box->is_suspected) continue;
-        const Hit hit = intersect(*box, ray, near_m);
-        if (!hit.is_hit || (nearest && hit.depth >= nearest_hit.depth)) continue;
-        colour = 0.45f * colour + 0.55f * shade(*box, hit, hit.depth * pixel_per_depth);
-    }
-    return colour;
-}
 
-void draw_boxes(const SiteModel &model, const oc_camera_t &camera, const RenderOptions &options, Frame *frame)
-{
-    const std::vector<Box> boxes = boxes_of(model, camera, options.near_m);
-    cv::Mat1b touched(frame->mask.size(), static_cast<unsigned char>(0));
-    for (const Box &box : boxes) touched(box.reach).setTo(255);
-    const Viewer viewer(camera);
-    const double pixel_per_depth = 1 / camera.k.fx_px;
-    const int n = options.supersample;
-    std::vector<const Box *> here;
-    for (int y = 0; y < touched.rows; y++) {
-        for (int x = 0; x < touched.cols; x++) {
-            if (!touched(y, x)) continue;
-            here.clear();
-            for (const Box &box : boxes) {
-                if (box.reach.contains({x, y})) here.push_back(&box);
-            }
-            const cv::Vec3f behind(frame->rgb(y, x));
-            cv::Vec3f sum(0, 0, 0);
-            int index = 0;
-            for (int i = 0; i < n * n; i++) {
-                const double sx = x + (i % n + 0.5) / n - 0.5, sy = y + (i / n + 0.5) / n - 0.5;
-                sum += through_boxes(here, viewer.ray(sx, sy), pixel_per_depth, options.near_m, behind, &index);
-            }
-            frame->rgb(y, x) = cv::Vec3b(sum * (1.f / static_cast<float>(n * n)));
-            through_boxes(here, viewer.ray(x, y), pixel_per_depth, options.near_m, behind, &index);
-            if (index > 0) frame->mask(y, x) = cv::saturate_cast<unsigned char>(std::min(index, 253));
+    cv::Vec3f through(double x, double y, int pixel_x, int pixel_y, const cv::Vec3f &behind) const
+    {
+        const Sight sight = look(x, y, pixel_x, pixel_y);
+        cv::Vec3f colour = sight.firm ? sight.firm->shade(sight.hit) : behind;
+        if (!sight.has_suspected) return colour;
+        for (const BoxView &box : boxes_) {
+            if (!box.is_suspected() || !box.reach().contains({pixel_x, pixel_y})) continue;
+            const BoxHit hit = box.hit(x, y);
+            if (!hit.is_hit || (sight.firm && hit.depth_m >= sight.hit.depth_m)) continue;
+            colour = 0.45f * colour + 0.55f * box.shade(hit);
         }
+        return colour;
     }
-}
 
-}  // namespace
+    cv::Vec3f blended(int x, int y) const
+    {
+        const cv::Vec3f behind = backdrop_.colour(x, y);
+        const int n = options_.supersample;
+        cv::Vec3f sum(0, 0, 0);
+        for (int i = 0; i < n * n; i++)
+            sum += through(x + (i % n + 0.5) / n - 0.5, y + (i / n + 0.5) / n - 0.5, x, y, behind);
+        return sum * (1.f / static_cast<float>(n * n));
+    }
+
+    const Backdrop &backdrop_;
+    const RenderOptions &options_;
+    std::vector<BoxView> boxes_;
+    cv::Mat1i faces_;
+};
+
+} // namespace
 
 Frame render_boxes(const SiteModel &model, const GroundTexture &ground, const oc_camera_t &camera,
                    const RenderOptions &options)
@@ -292,10 +196,10 @@ Frame render_boxes(const SiteModel &model, const GroundTexture &ground, const oc
         options.max_anisotropy > 16 || !(options.near_m > 0))
         throw std::invalid_argument("render options are out of range");
     const int width = static_cast<int>(camera.k.width_px), height = static_cast<int>(camera.k.height_px);
-    Frame frame{cv::Mat3b(height, width), cv::Mat1b(height, width, kMaskGround)};
-    draw_ground(ground, camera, options, &frame);
-    draw_boxes(model, camera, options, &frame);
+    Frame frame{cv::Mat3b(height, width), cv::Mat1b(height, width)};
+    const Backdrop backdrop(ground, camera, options.max_anisotropy);
+    Painter(model, backdrop, camera, options).draw(&frame);
     return frame;
 }
 
-}  // namespace outcrop
+} // namespace outcrop

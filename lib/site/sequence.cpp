@@ -34,7 +34,7 @@ void remove_old_frames(const fs::path &folder)
     }
 }
 
-}  // namespace
+} // namespace
 
 SequenceReport write_sequence(const std::string &dir, const std::string &as, const SiteModel &model,
                               const OverheadMap &overhead, const Path &path, const SequenceOptions &options,
@@ -69,4 +69,4 @@ SequenceReport write_sequence(const std::string &dir, const std::string &as, con
     return report;
 }
 
-}  // namespace outcrop
+} // namespace outcrop

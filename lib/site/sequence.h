@@ -19,7 +19,7 @@ struct SequenceOptions {
 
 struct SequenceReport {
     bool has_video = false;
-    std::string note;  // why there is no video
+    std::string note; // why there is no video
 };
 
 // Writes dir/<as>/frame_XX.png and mask_XX.png, one per frame of the path and
@@ -31,4 +31,4 @@ SequenceReport write_sequence(const std::string &dir, const std::string &as, con
                               const OverheadMap &overhead, const Path &path, const SequenceOptions &options,
                               const std::function<void(int, int)> &progress);
 
-}  // namespace outcrop
+} // namespace outcrop

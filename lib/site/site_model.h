@@ -19,16 +19,16 @@ enum class MatchKind { kObstacle, kGround };
 
 // Two junctions of two views that are the same corner in space.
 struct Match {
-    int left_junction = 0, right_junction = 0;  // index in View::junctions
+    int left_junction = 0, right_junction = 0; // index in View::junctions
     MatchKind kind = MatchKind::kObstacle;
-    double score = 0;  // of the correlation, or 1 - normalised SAD
-    double margin = 0; // score minus that of the runner-up
-    Eigen::Vector3d point = Eigen::Vector3d::Zero();  // metres, world
+    double score = 0;                                // of the correlation, or 1 - normalised SAD
+    double margin = 0;                               // score minus that of the runner-up
+    Eigen::Vector3d point = Eigen::Vector3d::Zero(); // metres, world
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
 };
 
 struct PairMatches {
-    int left = 0, right = 0;  // view ids
+    int left = 0, right = 0; // view ids
     std::vector<Match> matches;
 };
 
@@ -47,28 +47,29 @@ struct SitePoint {
     int n_views = 2;
     double score = 0;
     cv::Vec3b colour{200, 200, 200};
-    int obstacle = -1;  // index in SiteModel::obstacles, -1: none, -2: suspected
+    int obstacle = -1; // index in SiteModel::obstacles, -1: none, -2: suspected
 };
 
 // A bounding box standing on the ground.
 struct Obstacle {
-    int index = 0;  // 1..
-    Eigen::Vector3d aabb_min, aabb_max;
-    Eigen::Vector3d obb_centre, obb_size;  // size.x along the yaw direction
-    double yaw_rad = 0;                    // counter-clockwise from +X, (-pi/2, pi/2]
+    int index = 0; // 1..
+    Eigen::Vector3d aabb_min = Eigen::Vector3d::Zero(), aabb_max = Eigen::Vector3d::Zero();
+    Eigen::Vector3d obb_centre = Eigen::Vector3d::Zero(),
+                    obb_size = Eigen::Vector3d::Zero(); // size.x along the yaw direction
+    double yaw_rad = 0;                                 // counter-clockwise from +X, (-pi/2, pi/2]
     int n_points = 0;
-    bool is_suspected = false;  // few points: shown, never dropped silently
+    bool is_suspected = false; // few points: shown, never dropped silently
 };
 
 struct SiteModel {
-    std::vector<RefinedView> views;  // ascending id
-    std::vector<PairMatches> pairs;  // ascending (left, right)
+    std::vector<RefinedView> views; // ascending id
+    std::vector<PairMatches> pairs; // ascending (left, right)
     std::vector<SitePoint> points;
-    std::vector<Obstacle> obstacles;  // is_suspected false
+    std::vector<Obstacle> obstacles; // is_suspected false
     std::vector<Obstacle> suspected;
     Area area;
-    std::map<std::string, double> counts;  // for the report
-    std::map<std::string, double> ms;      // time per step; not part of equality
+    std::map<std::string, double> counts; // for the report
+    std::map<std::string, double> ms;     // time per step; not part of equality
 };
 
-}  // namespace outcrop
+} // namespace outcrop

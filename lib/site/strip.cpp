@@ -10,8 +10,8 @@ namespace outcrop {
 namespace {
 
 constexpr int kBucketPx = 16;
-constexpr double kThesisLinePx = 3;     // t_F of the thesis' section 5.9, where margins leave no strip
-constexpr double kNoHeightLimit = 1e4;  // metres
+constexpr double kThesisLinePx = 3;    // t_F of the thesis' section 5.9, where margins leave no strip
+constexpr double kNoHeightLimit = 1e4; // metres
 
 struct Rect {
     double x_min = 0, y_min = 0, x_max = 0, y_max = 0;
@@ -21,8 +21,7 @@ struct Rect {
 class BucketIndex {
 public:
     BucketIndex(const View &view, bool with_ground)
-        : view_(view),
-          n_x_(static_cast<int>(view.camera.k.width_px) / kBucketPx + 1),
+        : view_(view), n_x_(static_cast<int>(view.camera.k.width_px) / kBucketPx + 1),
           n_y_(static_cast<int>(view.camera.k.height_px) / kBucketPx + 1),
           buckets_(static_cast<std::size_t>(n_x_) * n_y_)
     {
@@ -103,7 +102,8 @@ public:
     bool contains(double x_px, double y_px) const
     {
         if (options_.method == StripMethod::kThesis) {
-            return oc_strip_contains_thesis(&thesis_strip_, x_px, y_px) || std::abs(distance_px(x_px, y_px)) < kThesisLinePx;
+            return oc_strip_contains_thesis(&thesis_strip_, x_px, y_px) ||
+                   std::abs(distance_px(x_px, y_px)) < kThesisLinePx;
         }
         if (!oc_strip_contains(&strip_, x_px, y_px)) return false;
         if (options_.max_half_width_px > 0 && std::abs(distance_px(x_px, y_px)) > options_.max_half_width_px) {
@@ -125,7 +125,8 @@ private:
     // The variance is a convex quadratic along the line: its largest value is at an end.
     double half_width_px(const double at[2]) const
     {
-        const double width = OC_STRIP_MAX_SIGMA * std::sqrt(std::max(0.0, oc_strip_variance_px2(&strip_, at[0], at[1])));
+        const double width =
+            OC_STRIP_MAX_SIGMA * std::sqrt(std::max(0.0, oc_strip_variance_px2(&strip_, at[0], at[1])));
         return options_.max_half_width_px > 0 ? std::min(width, options_.max_half_width_px) : width;
     }
 
@@ -135,7 +136,7 @@ private:
     oc_reach_t reach_{}, rival_reach_{};
     oc_strip_t strip_{};
     bool has_inner_ = false;
-    oc_segment_t inner_{}, outer_{};  // heights of obstacles, and of rivals
+    oc_segment_t inner_{}, outer_{}; // heights of obstacles, and of rivals
     oc_pair_thesis_t thesis_pair_{};
     oc_strip_thesis_t thesis_strip_{};
 };
@@ -149,7 +150,7 @@ bool is_in_area(const oc_midpoint_t &midpoint, const Area &area, const StripOpti
            p[1] <= area.y_max + slack;
 }
 
-}  // namespace
+} // namespace
 
 bool prepare_pair(const PosedView &left, const PosedView &right, const StripOptions &options, oc_pair_t *pair)
 {
@@ -184,7 +185,8 @@ std::vector<Candidate> find_candidates(const oc_pair_t &pair, const PosedView &l
                 continue;
             }
             if (!(midpoint.depth_left_m > 0 && midpoint.depth_right_m > 0)) continue;
-            const bool is_rival = is_left_ground || is_right_ground || !gate.is_inside(r.x_px, r.y_px) || !is_in_area(midpoint, area, options);
+            const bool is_rival = is_left_ground || is_right_ground || !gate.is_inside(r.x_px, r.y_px) ||
+                                  !is_in_area(midpoint, area, options);
             if (is_rival && !options.with_rivals) continue;
             candidates.push_back(Candidate{static_cast<int>(i), j, gate.distance_px(r.x_px, r.y_px),
                                            Eigen::Vector3d(midpoint.p_in_world), is_rival});
@@ -193,4 +195,4 @@ std::vector<Candidate> find_candidates(const oc_pair_t &pair, const PosedView &l
     return candidates;
 }
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -14,8 +14,8 @@
 namespace outcrop {
 
 enum class StripMethod {
-    kCovariance,  // all errors together, 99 % (docs/design.md)
-    kThesis       // one parameter at a time, Eq 5.9-5.16; neither height nor area limits
+    kCovariance, // all errors together, 99 % (docs/design.md)
+    kThesis      // one parameter at a time, Eq 5.9-5.16; neither height nor area limits
 };
 
 struct StripOptions {
@@ -32,9 +32,9 @@ struct StripOptions {
 // A left and a right junction (indices in View::junctions) that may be one corner.
 struct Candidate {
     int left = 0, right = 0;
-    double distance_px = 0;  // from the epipolar line
-    Eigen::Vector3d point = Eigen::Vector3d::Zero();  // midpoint of the two rays, metres
-    bool is_rival = false;   // no obstacle of this site, but may be what the left junction really is
+    double distance_px = 0;                          // from the epipolar line
+    Eigen::Vector3d point = Eigen::Vector3d::Zero(); // midpoint of the two rays, metres
+    bool is_rival = false; // no obstacle of this site, but may be what the left junction really is
 };
 
 // Candidates of all left junctions, ascending (left, right).
@@ -56,4 +56,4 @@ std::vector<Candidate> find_candidates(const oc_pair_t &pair, const PosedView &l
 // a camera within its margins stands in the ground plane).
 bool prepare_pair(const PosedView &left, const PosedView &right, const StripOptions &options, oc_pair_t *pair);
 
-}  // namespace outcrop
+} // namespace outcrop

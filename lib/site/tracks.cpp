@@ -17,20 +17,21 @@ namespace outcrop {
 namespace {
 
 struct Edge {
-    int a = 0, b = 0;  // indices of pixels
+    int a = 0, b = 0; // indices of pixels
     MatchKind kind = MatchKind::kObstacle;
     double score = 0;
-    int support = 0;  // third pixels matched with both ends
+    int support = 0; // third pixels matched with both ends
 };
 
 // The graph of all matches: nodes are pixels in (view, junction) order, so indices do not depend on the input's order.
 struct Graph {
     std::vector<TrackPixel> pixels;
     std::vector<Edge> edges;
-    std::vector<std::vector<int>> neighbours;  // ascending
+    std::vector<std::vector<int>> neighbours; // ascending
 };
 
-std::map<int, int> index_of_id(const std::vector<View> &views) {
+std::map<int, int> index_of_id(const std::vector<View> &views)
+{
     std::map<int, int> index;
     for (std::size_t i = 0; i < views.size(); ++i) index[views[i].id] = static_cast<int>(i);
     return index;
@@ -42,7 +43,8 @@ struct RawEdge {
     double score;
 };
 
-std::vector<RawEdge> collect(const std::vector<View> &views, const std::vector<PairMatches> &pairs) {
+std::vector<RawEdge> collect(const std::vector<View> &views, const std::vector<PairMatches> &pairs)
+{
     const std::map<int, int> index = index_of_id(views);
     std::vector<RawEdge> raw;
     for (const PairMatches &pair : pairs) {
@@ -61,7 +63,8 @@ std::vector<RawEdge> collect(const std::vector<View> &views, const std::vector<P
     return raw;
 }
 
-Graph build_graph(const std::vector<View> &views, const std::vector<PairMatches> &pairs) {
+Graph build_graph(const std::vector<View> &views, const std::vector<PairMatches> &pairs)
+{
     const std::vector<RawEdge> raw = collect(views, pairs);
     Graph graph;
     for (const RawEdge &e : raw) {
@@ -87,7 +90,8 @@ Graph build_graph(const std::vector<View> &views, const std::vector<PairMatches>
     return graph;
 }
 
-int common(const std::vector<int> &a, const std::vector<int> &b) {
+int common(const std::vector<int> &a, const std::vector<int> &b)
+{
     int n = 0;
     for (auto i = a.begin(), j = b.begin(); i != a.end() && j != b.end();) {
         if (*i == *j) ++n;
@@ -102,10 +106,11 @@ int common(const std::vector<int> &a, const std::vector<int> &b) {
     return n;
 }
 
-void rank_edges(Graph *graph) {
+void rank_edges(Graph *graph)
+{
     for (Edge &e : graph->edges) {
-        e.support = common(graph->neighbours[static_cast<std::size_t>(e.a)],
-                           graph->neighbours[static_cast<std::size_t>(e.b)]);
+        e.support =
+            common(graph->neighbours[static_cast<std::size_t>(e.a)], graph->neighbours[static_cast<std::size_t>(e.b)]);
     }
     std::sort(graph->edges.begin(), graph->edges.end(), [](const Edge &x, const Edge &y) {
         return std::tuple(-x.support, -x.score, x.a, x.b, static_cast<int>(x.kind)) <
@@ -113,9 +118,10 @@ void rank_edges(Graph *graph) {
     });
 }
 
-}  // namespace
+} // namespace
 
-void TrackOptions::check() const {
+void TrackOptions::check() const
+{
     triangulate.check();
     const double least[] = {max_reprojection_px, chi, height_share, max_sigma_share};
     for (const double value : least)
@@ -126,7 +132,8 @@ void TrackOptions::check() const {
 }
 
 std::vector<Track> merge_tracks(const std::vector<View> &views, const std::vector<PairMatches> &pairs,
-                                std::map<std::string, double> *counts) {
+                                std::map<std::string, double> *counts)
+{
     Graph graph = build_graph(views, pairs);
     rank_edges(&graph);
     std::vector<int> view_of;
@@ -139,7 +146,7 @@ std::vector<Track> merge_tracks(const std::vector<View> &views, const std::vecto
         if (!is_used[i]) ++n_conflicts;
     }
 
-    std::map<int, Track> by_root;  // roots are least members, so tracks come out in the order of their first pixel
+    std::map<int, Track> by_root; // roots are least members, so tracks come out in the order of their first pixel
     for (std::size_t i = 0; i < graph.pixels.size(); ++i)
         by_root[components.root(static_cast<int>(i))].pixels.push_back(graph.pixels[i]);
     std::map<int, int> ground_votes;
@@ -163,7 +170,8 @@ std::vector<Track> merge_tracks(const std::vector<View> &views, const std::vecto
     return tracks;
 }
 
-double ground_height(const std::vector<oc_camera_t> &cameras, const TrackOptions &options) {
+double ground_height(const std::vector<oc_camera_t> &cameras, const TrackOptions &options)
+{
     if (options.ground_height_m > 0 || cameras.empty()) return options.ground_height_m;
     double sum = 0;
     for (const oc_camera_t &camera : cameras) sum += std::abs(camera_centre(camera).z());
@@ -181,7 +189,8 @@ struct Settler {
     double t_h = 0, highest_ground = 0, diagonal = 0;
     std::map<std::string, double> drops;
 
-    Sighting sighting(const TrackPixel &p) const {
+    Sighting sighting(const TrackPixel &p) const
+    {
         const std::size_t view = static_cast<std::size_t>(p.view);
         const oc_junction_t &j = views[view].junctions[static_cast<std::size_t>(p.junction)];
         Sighting s;
@@ -193,7 +202,8 @@ struct Settler {
     }
 
     // Squared misfit over what is allowed; > 1: does not fit.
-    double misfit(const Sighting &s, const Eigen::Vector3d &point) const {
+    double misfit(const Sighting &s, const Eigen::Vector3d &point) const
+    {
         Eigen::Vector2d pixel;
         Matrix26d by_pose;
         if (!project_with_derivatives(*s.camera, point, &pixel, nullptr, &by_pose)) return 1e30;
@@ -205,14 +215,17 @@ struct Settler {
         return off.dot(allowed.inverse() * off);
     }
 
-    std::optional<Triangulated> triangulate_of(const std::vector<Sighting> &all, const std::vector<std::size_t> &use) const {
+    std::optional<Triangulated> triangulate_of(const std::vector<Sighting> &all,
+                                               const std::vector<std::size_t> &use) const
+    {
         std::vector<Sighting> some;
         for (const std::size_t i : use) some.push_back(all[i]);
         return triangulate(some, options.triangulate);
     }
 
     // Indices of the sightings that fit the point, and the sum of their misfits.
-    std::vector<std::size_t> fitting(const std::vector<Sighting> &all, const Eigen::Vector3d &point, double *sum) const {
+    std::vector<std::size_t> fitting(const std::vector<Sighting> &all, const Eigen::Vector3d &point, double *sum) const
+    {
         std::vector<std::size_t> good;
         *sum = 0;
         for (std::size_t i = 0; i < all.size(); ++i) {
@@ -225,7 +238,8 @@ struct Settler {
     }
 
     // The largest set of sightings that one pair of them explains; of equal ones the best fitting.
-    std::vector<std::size_t> consensus(const std::vector<Sighting> &all) const {
+    std::vector<std::size_t> consensus(const std::vector<Sighting> &all) const
+    {
         std::vector<std::size_t> best;
         double best_sum = 0;
         for (std::size_t i = 0; i < all.size(); ++i) {
@@ -243,7 +257,8 @@ struct Settler {
     }
 
     // Triangulates; when not all sightings fit, those that do not are left out.
-    bool fit(Track *track) const {
+    bool fit(Track *track) const
+    {
         std::vector<Sighting> all;
         for (const TrackPixel &p : track->pixels) all.push_back(sighting(p));
         std::vector<std::size_t> use(all.size());
@@ -264,19 +279,22 @@ struct Settler {
         return false;
     }
 
-    static void keep(const std::vector<std::size_t> &use, Track *track) {
+    static void keep(const std::vector<std::size_t> &use, Track *track)
+    {
         std::vector<TrackPixel> pixels;
         for (const std::size_t i : use) pixels.push_back(track->pixels[i]);
         track->pixels = std::move(pixels);
     }
 
-    bool is_inside(const Eigen::Vector3d &p) const {
+    bool is_inside(const Eigen::Vector3d &p) const
+    {
         const double slack = options.area_slack * diagonal;
         return p.x() >= area.x_min - slack && p.x() <= area.x_max + slack && p.y() >= area.y_min - slack &&
                p.y() <= area.y_max + slack && p.z() <= area.z_max + slack;
     }
 
-    bool settle(Track *track) {
+    bool settle(Track *track)
+    {
         if (!fit(track)) return ++drops["tracks_inconsistent"], false;
         const double sigma_z = std::sqrt(track->fit.covariance(2, 2));
         const double z = track->fit.point.z();
@@ -292,12 +310,12 @@ struct Settler {
     }
 };
 
-}  // namespace
+} // namespace
 
 std::vector<Track> settle_tracks(const std::vector<View> &views, const std::vector<oc_camera_t> &cameras,
                                  const std::vector<Matrix6d> &pose_covariances, const std::vector<Track> &tracks,
-                                 const Area &area, const TrackOptions &options,
-                                 std::map<std::string, double> *counts) {
+                                 const Area &area, const TrackOptions &options, std::map<std::string, double> *counts)
+{
     Settler settler{views, cameras, pose_covariances, area, options, 0, 0, 0, {}};
     settler.t_h = ground_height(cameras, options);
     TrackOptions share = options;
@@ -305,8 +323,8 @@ std::vector<Track> settle_tracks(const std::vector<View> &views, const std::vect
     share.height_share = options.max_ground_height_share;
     settler.highest_ground = ground_height(cameras, share);
     settler.diagonal = std::hypot(area.x_max - area.x_min, area.y_max - area.y_min);
-    settler.drops = {{"tracks_inconsistent", 0}, {"tracks_outside", 0}, {"tracks_below_ground", 0},
-                     {"tracks_uncertain", 0}};
+    settler.drops = {
+        {"tracks_inconsistent", 0}, {"tracks_outside", 0}, {"tracks_below_ground", 0}, {"tracks_uncertain", 0}};
     std::vector<Track> settled;
     for (Track track : tracks)
         if (settler.settle(&track)) settled.push_back(std::move(track));
@@ -315,4 +333,4 @@ std::vector<Track> settle_tracks(const std::vector<View> &views, const std::vect
     return settled;
 }
 
-}  // namespace outcrop
+} // namespace outcrop

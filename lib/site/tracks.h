@@ -13,33 +13,33 @@
 namespace outcrop {
 
 struct TrackPixel {
-    int view = 0;      // index in the list of views, not the id
-    int junction = 0;  // index in View::junctions
+    int view = 0;     // index in the list of views, not the id
+    int junction = 0; // index in View::junctions
     bool operator<(const TrackPixel &o) const { return view != o.view ? view < o.view : junction < o.junction; }
     bool operator==(const TrackPixel &o) const { return view == o.view && junction == o.junction; }
 };
 
 // One corner in space, seen in two or more views, at most once in each.
 struct Track {
-    std::vector<TrackPixel> pixels;  // ascending view
+    std::vector<TrackPixel> pixels; // ascending view
     MatchKind kind = MatchKind::kObstacle;
-    double score = 0;                // best of its matches
-    Triangulated fit;                // valid after settle_tracks
+    double score = 0; // best of its matches
+    Triangulated fit; // valid after settle_tracks
 };
 
 struct TrackOptions {
     TriangulateOptions triangulate;
-    double max_reprojection_px = 2.0;  // of a sighting, on top of what the poses' covariance allows
-    double chi = 2.58;                 // gate on uncertain poses, in sigmas
-    double ground_height_m = 0;        // t_h: lower points are ground; 0: height_share of the mean camera height
+    double max_reprojection_px = 2.0; // of a sighting, on top of what the poses' covariance allows
+    double chi = 2.58;                // gate on uncertain poses, in sigmas
+    double ground_height_m = 0;       // t_h: lower points are ground; 0: height_share of the mean camera height
     double height_share = 0.006;
-    // A point within so many sigma_Z of Z = 0 is ground as well, unless it is higher than max_ground_height_share of the
-    // mean camera height: where its matches call it ground, and where they call it obstacle.
+    // A point within so many sigma_Z of Z = 0 is ground as well, unless it is higher than max_ground_height_share of
+    // the mean camera height: where its matches call it ground, and where they call it obstacle.
     double ground_sigmas = 2.58;
     double obstacle_sigmas = 1.0;
     double max_ground_height_share = 0.03;
-    double area_slack = 0.02;          // of the area's diagonal; points farther outside are dropped
-    double max_sigma_share = 0.05;     // of the area's diagonal; less certain points are dropped
+    double area_slack = 0.02;      // of the area's diagonal; points farther outside are dropped
+    double max_sigma_share = 0.05; // of the area's diagonal; less certain points are dropped
     void check() const;
 };
 
@@ -60,4 +60,4 @@ std::vector<Track> settle_tracks(const std::vector<View> &views, const std::vect
 // t_h in metres as the options and the cameras' heights say.
 double ground_height(const std::vector<oc_camera_t> &cameras, const TrackOptions &options);
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -23,19 +23,22 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-Matrix3d cross_matrix(const Vector3d &v) {
+Matrix3d cross_matrix(const Vector3d &v)
+{
     Matrix3d m;
     m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
     return m;
 }
 
-Vector3d ray_of(const Sighting &s) {
+Vector3d ray_of(const Sighting &s)
+{
     Vector3d dir;
     oc_camera_ray(s.camera, s.x_px, s.y_px, dir.data());
     return dir;
 }
 
-std::optional<Vector3d> nearest_point(const std::vector<Sighting> &sightings) {
+std::optional<Vector3d> nearest_point(const std::vector<Sighting> &sightings)
+{
     std::vector<oc_camera_t> cameras;
     std::vector<std::array<double, 2>> pixels;
     for (const Sighting &s : sightings) {
@@ -49,7 +52,8 @@ std::optional<Vector3d> nearest_point(const std::vector<Sighting> &sightings) {
     return point;
 }
 
-double widest_angle(const std::vector<Vector3d> &rays) {
+double widest_angle(const std::vector<Vector3d> &rays)
+{
     double least = 1;
     for (std::size_t i = 0; i < rays.size(); ++i)
         for (std::size_t j = i + 1; j < rays.size(); ++j) least = std::min(least, rays[i].dot(rays[j]));
@@ -62,7 +66,8 @@ struct Normal {
 };
 
 // Normal equations of the reprojection at `point`; false when it is not in front of every camera.
-bool accumulate(const std::vector<Sighting> &sightings, double sigma_px, const Vector3d &point, Normal *normal) {
+bool accumulate(const std::vector<Sighting> &sightings, double sigma_px, const Vector3d &point, Normal *normal)
+{
     for (const Sighting &s : sightings) {
         Vector2d pixel;
         Eigen::Matrix<double, 2, 3> by_point;
@@ -77,7 +82,8 @@ bool accumulate(const std::vector<Sighting> &sightings, double sigma_px, const V
     return true;
 }
 
-bool measure(const std::vector<Sighting> &sightings, Triangulated *result) {
+bool measure(const std::vector<Sighting> &sightings, Triangulated *result)
+{
     double sum = 0;
     for (const Sighting &s : sightings) {
         Vector2d pixel;
@@ -90,23 +96,29 @@ bool measure(const std::vector<Sighting> &sightings, Triangulated *result) {
     return true;
 }
 
-}  // namespace
+} // namespace
 
-void TriangulateOptions::check() const {
+void TriangulateOptions::check() const
+{
     if (!(sigma_px > 0) || !(min_parallax_rad >= 0) || iterations < 0)
         throw std::invalid_argument("triangulate: sigma_px must be > 0, min_parallax_rad and iterations >= 0");
 }
 
-Vector3d camera_centre(const oc_camera_t &camera) {
+Vector3d camera_centre(const oc_camera_t &camera)
+{
     Vector3d centre;
     oc_pose_centre(&camera.pose, centre.data());
     return centre;
 }
 
-Matrix3d camera_rotation(const oc_camera_t &camera) { return Eigen::Map<const RowMatrix3d>(camera.pose.R); }
+Matrix3d camera_rotation(const oc_camera_t &camera)
+{
+    return Eigen::Map<const RowMatrix3d>(camera.pose.R);
+}
 
 bool project_with_derivatives(const oc_camera_t &camera, const Vector3d &point, Vector2d *pixel,
-                              Eigen::Matrix<double, 2, 3> *by_point, Matrix26d *by_pose) {
+                              Eigen::Matrix<double, 2, 3> *by_point, Matrix26d *by_pose)
+{
     const Matrix3d rotation = camera_rotation(camera);
     const Vector3d in_cam = rotation * point + Eigen::Map<const Vector3d>(camera.pose.t);
     if (!(in_cam.z() > 0)) return false;
@@ -124,7 +136,8 @@ bool project_with_derivatives(const oc_camera_t &camera, const Vector3d &point, 
     return true;
 }
 
-Matrix3d rotation_by_opk(const oc_camera_t &camera) {
+Matrix3d rotation_by_opk(const oc_camera_t &camera)
+{
     double thesis[9], omega, phi, kappa;
     oc_cv_from_thesis(camera.pose.R, thesis);
     oc_opk_from_thesis(thesis, &omega, &phi, &kappa);
@@ -137,7 +150,8 @@ Matrix3d rotation_by_opk(const oc_camera_t &camera) {
     return -(Vector3d(1, -1, -1).asDiagonal() * axes);
 }
 
-Matrix6d pose_covariance(const oc_camera_t &camera, const oc_margin_t &half_widths, double floor) {
+Matrix6d pose_covariance(const oc_camera_t &camera, const oc_margin_t &half_widths, double floor)
+{
     Eigen::Matrix<double, 6, 1> variance;
     for (int i = 0; i < 6; ++i) variance[i] = half_widths.v[i] * half_widths.v[i] / 3.0;
     const Matrix3d turn = rotation_by_opk(camera);
@@ -148,7 +162,8 @@ Matrix6d pose_covariance(const oc_camera_t &camera, const oc_margin_t &half_widt
     return covariance;
 }
 
-std::optional<Triangulated> triangulate(const std::vector<Sighting> &sightings, const TriangulateOptions &options) {
+std::optional<Triangulated> triangulate(const std::vector<Sighting> &sightings, const TriangulateOptions &options)
+{
     if (sightings.size() < 2) return std::nullopt;
     std::vector<Vector3d> rays;
     rays.reserve(sightings.size());
@@ -173,4 +188,4 @@ std::optional<Triangulated> triangulate(const std::vector<Sighting> &sightings, 
     return result;
 }
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -24,18 +24,18 @@ struct Sighting {
 };
 
 struct TriangulateOptions {
-    double sigma_px = 0.7;         // of a pixel coordinate
+    double sigma_px = 0.7;          // of a pixel coordinate
     double min_parallax_rad = 0.03; // widest angle between two of the rays
-    int iterations = 3;            // of the weighted least squares after the midpoint; 0: thesis
-    void check() const;            // throws std::invalid_argument
+    int iterations = 3;             // of the weighted least squares after the midpoint; 0: thesis
+    void check() const;             // throws std::invalid_argument
 };
 
 struct Triangulated {
     Eigen::Vector3d point = Eigen::Vector3d::Zero();
-    Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  // pixel and pose errors
-    double rms_px = 0;         // of the reprojection, over all coordinates
-    double worst_px = 0;       // of the sightings' distances
-    double parallax_rad = 0;   // widest angle between two rays
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity(); // pixel and pose errors
+    double rms_px = 0;                                        // of the reprojection, over all coordinates
+    double worst_px = 0;                                      // of the sightings' distances
+    double parallax_rad = 0;                                  // widest angle between two rays
 };
 
 // Midpoint of the common perpendicular of n >= 2 rays (thesis Eq 2.77, 5.28; for more rays the sums run over
@@ -52,10 +52,10 @@ bool project_with_derivatives(const oc_camera_t &camera, const Eigen::Vector3d &
 // R(opk + d_opk) = exp([d_w]x) R(opk). Singular at phi = +-90 degrees.
 Eigen::Matrix3d rotation_by_opk(const oc_camera_t &camera);
 
-// Covariance of (centre, rotation vector) of uniform errors with these half-widths; never below floor^2 on the diagonal.
+// Covariance of (centre, rotation vector) of uniform errors with these half-widths, plus floor^2 on the diagonal.
 Matrix6d pose_covariance(const oc_camera_t &camera, const oc_margin_t &half_widths, double floor = 1e-9);
 
 Eigen::Vector3d camera_centre(const oc_camera_t &camera);
-Eigen::Matrix3d camera_rotation(const oc_camera_t &camera);  // cam_from_world
+Eigen::Matrix3d camera_rotation(const oc_camera_t &camera); // cam_from_world
 
-}  // namespace outcrop
+} // namespace outcrop

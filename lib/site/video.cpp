@@ -28,10 +28,13 @@ VideoWriter::VideoWriter(const std::string &path, cv::Size size, int frames_per_
         return;
     }
     const std::string dimensions = std::to_string(size.width) + "x" + std::to_string(size.height);
-    std::vector<std::string> words = {"ffmpeg", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24",
-                                      "-s", dimensions, "-r", std::to_string(frames_per_s), "-i", "-",
-                                      "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "20",
-                                      "-pix_fmt", "yuv420p", "-movflags", "+faststart", part_};
+    std::vector<std::string> words = {"ffmpeg",   "-loglevel", "error",     "-y",
+                                      "-f",       "rawvideo",  "-pix_fmt",  "rgb24",
+                                      "-s",       dimensions,  "-r",        std::to_string(frames_per_s),
+                                      "-i",       "-",         "-vf",       "pad=ceil(iw/2)*2:ceil(ih/2)*2",
+                                      "-c:v",     "libx264",   "-crf",      "20",
+                                      "-pix_fmt", "yuv420p",   "-movflags", "+faststart",
+                                      part_};
     std::vector<char *> argv;
     for (std::string &word : words) argv.push_back(word.data());
     argv.push_back(nullptr);
@@ -114,4 +117,4 @@ bool VideoWriter::close()
     return false;
 }
 
-}  // namespace outcrop
+} // namespace outcrop

@@ -57,8 +57,8 @@ void mark(const oc_junction_t &junction, int radius_px, int n_x, int n_y, std::v
     }
 }
 
-WantedBlocks blocks_of(const PosedView &posed, const std::vector<int> &partners,
-                       const std::vector<std::uint8_t> *asked, const WantedBlocksOptions &options)
+WantedBlocks blocks_of(const PosedView &posed, const std::vector<int> &partners, const std::vector<std::uint8_t> *asked,
+                       const WantedBlocksOptions &options)
 {
     const View &view = *posed.view;
     const int n_x = blocks_across(view.camera.k.width_px);
@@ -86,7 +86,7 @@ WantedBlocks blocks_of(const PosedView &posed, const std::vector<int> &partners,
     return result;
 }
 
-}  // namespace
+} // namespace
 
 std::vector<WantedBlocks> wanted_blocks(const std::vector<PosedView> &views, const std::vector<ViewPair> &pairs,
                                         const Area &area, const std::vector<std::vector<std::uint8_t>> &asked,
@@ -107,4 +107,4 @@ std::vector<WantedBlocks> wanted_blocks(const std::vector<PosedView> &views, con
     return all;
 }
 
-}  // namespace outcrop
+} // namespace outcrop

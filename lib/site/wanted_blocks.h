@@ -20,8 +20,8 @@ struct WantedBlocksOptions {
 
 // Blocks of one view, raster index by * ceil(width / 8) + bx as in a patch request.
 struct WantedBlocks {
-    int view = 0;  // View::id
-    std::vector<std::uint16_t> blocks;  // ascending
+    int view = 0;                      // View::id
+    std::vector<std::uint16_t> blocks; // ascending
 };
 
 // For each view the 8x8 blocks round junctions that have a candidate in at
@@ -37,4 +37,4 @@ std::vector<WantedBlocks> wanted_blocks(const std::vector<PosedView> &views, con
                                         const Area &area, const std::vector<std::vector<std::uint8_t>> &asked,
                                         const WantedBlocksOptions &options = {});
 
-}  // namespace outcrop
+} // namespace outcrop

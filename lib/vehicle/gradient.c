@@ -13,8 +13,8 @@
 
 static bool gradient_size_is_valid(uint32_t width_px, uint32_t height_px)
 {
-    return width_px >= OC_MIN_IMAGE_SIDE && width_px <= OC_MAX_IMAGE_SIDE &&
-           height_px >= OC_MIN_IMAGE_SIDE && height_px <= OC_MAX_IMAGE_SIDE;
+    return width_px >= OC_MIN_IMAGE_SIDE && width_px <= OC_MAX_IMAGE_SIDE && height_px >= OC_MIN_IMAGE_SIDE &&
+           height_px <= OC_MAX_IMAGE_SIDE;
 }
 
 /* A filtered row carries the replicated border on both sides. */
@@ -55,8 +55,8 @@ size_t oc_gradient_size_bytes(uint32_t width_px, uint32_t height_px)
            oc_arena_cost(ROWS * gradient_row_length(width_px) * sizeof(uint16_t));
 }
 
-oc_status_t oc_gradient_init(oc_gradient_t *gradient, oc_arena_t *arena, uint32_t width_px,
-                             uint32_t height_px, float sigma_px)
+oc_status_t oc_gradient_init(oc_gradient_t *gradient, oc_arena_t *arena, uint32_t width_px, uint32_t height_px,
+                             float sigma_px)
 {
     OC_ASSERT(gradient && arena);
 
@@ -68,8 +68,7 @@ oc_status_t oc_gradient_init(oc_gradient_t *gradient, oc_arena_t *arena, uint32_
     const size_t area = (size_t)width_px * height_px;
     const size_t row_bytes = ROWS * gradient_row_length(width_px) * sizeof(uint16_t);
     void *piece[5];
-    const size_t bytes[5] = {area * sizeof(int16_t), area * sizeof(int16_t),
-                             area * sizeof(uint16_t), area, row_bytes};
+    const size_t bytes[5] = {area * sizeof(int16_t), area * sizeof(int16_t), area * sizeof(uint16_t), area, row_bytes};
     for (uint32_t i = 0; i < 5; i++) {
         const oc_status_t status = oc_arena_take(arena, bytes[i], &piece[i]);
         if (status != OC_OK) return status;
@@ -124,8 +123,7 @@ static void gradient_replicate_ends(uint16_t *row, uint32_t width)
 
 /* Horizontal pass, in[-r .. width + r) to out[0 .. width). Each product is cut
  * to 16 bits, at most r / 256 of a level too dark, the same everywhere. */
-static void gradient_filter_across(const oc_gradient_t *gradient, const uint16_t *restrict in,
-                                   uint16_t *restrict out)
+static void gradient_filter_across(const oc_gradient_t *gradient, const uint16_t *restrict in, uint16_t *restrict out)
 {
     const uint32_t width = gradient->width_px;
     const uint32_t centre = gradient->kernel[0];
@@ -141,8 +139,8 @@ static void gradient_filter_across(const oc_gradient_t *gradient, const uint16_t
     }
 }
 
-static void gradient_differ(const oc_gradient_t *gradient, uint32_t y, const uint16_t *above,
-                            const uint16_t *here, const uint16_t *below)
+static void gradient_differ(const oc_gradient_t *gradient, uint32_t y, const uint16_t *above, const uint16_t *here,
+                            const uint16_t *below)
 {
     const uint32_t width = gradient->width_px;
     int16_t *restrict dx = gradient->dx + (size_t)y * width;
@@ -241,8 +239,7 @@ uint32_t oc_gradient_edges(oc_gradient_t *gradient, float t_b)
             const uint16_t *m = gradient->magnitude + row + x;
             if (*m < threshold) continue;
 
-            const int32_t step =
-                gradient_neighbour(gradient->dx[row + x], gradient->dy[row + x], (int32_t)width);
+            const int32_t step = gradient_neighbour(gradient->dx[row + x], gradient->dy[row + x], (int32_t)width);
             const bool thin = *m > *(m - step) && *m >= *(m + step);
             gradient->edge[row + x] = thin ? OC_EDGE_THICK | OC_EDGE_THIN : OC_EDGE_THICK;
             n_thin += thin;
@@ -264,8 +261,7 @@ static uint32_t gradient_quarter_sector(int32_t ax, int32_t ay)
 
 uint32_t oc_gradient_sector(int32_t dx, int32_t dy)
 {
-    const uint32_t s = dx == 0 && dy == 0 ? 0
-                                          : gradient_quarter_sector(dx < 0 ? -dx : dx, dy < 0 ? -dy : dy);
+    const uint32_t s = dx == 0 && dy == 0 ? 0 : gradient_quarter_sector(dx < 0 ? -dx : dx, dy < 0 ? -dy : dy);
     if (dx >= 0) return dy >= 0 ? s : (16u - s) & 15u;
     return dy >= 0 ? 8u - s : 8u + s;
 }

@@ -32,12 +32,12 @@ extern "C" {
 /* Planes are row-major with pitch width_px, no padding. */
 typedef struct oc_gradient {
     uint32_t width_px, height_px;
-    int32_t radius;                               /* of the kernel in use, px */
-    uint16_t kernel[OC_GRADIENT_MAX_RADIUS + 1];  /* centre outwards, all 2 r + 1 sum to 256 */
-    int16_t *dx, *dy;                             /* OC_GRADIENT_ONE per grey level/px */
-    uint16_t *magnitude;                          /* same unit */
-    uint8_t *edge;                                /* OC_EDGE_* */
-    uint16_t *row;                                /* scratch: filtered rows */
+    int32_t radius;                              /* of the kernel in use, px */
+    uint16_t kernel[OC_GRADIENT_MAX_RADIUS + 1]; /* centre outwards, all 2 r + 1 sum to 256 */
+    int16_t *dx, *dy;                            /* OC_GRADIENT_ONE per grey level/px */
+    uint16_t *magnitude;                         /* same unit */
+    uint8_t *edge;                               /* OC_EDGE_* */
+    uint16_t *row;                               /* scratch: filtered rows */
 } oc_gradient_t;
 
 /* Bytes that oc_gradient_init takes, padding included; 0 for sides outside
@@ -48,8 +48,8 @@ size_t oc_gradient_size_bytes(uint32_t width_px, uint32_t height_px);
  *
  * sigma_px in OC_GRADIENT_MIN_SIGMA_PX..OC_GRADIENT_MAX_SIGMA_PX, else
  * OC_E_ARG, as for a bad size; OC_E_SPACE when the arena is too small. */
-OC_CHECKED oc_status_t oc_gradient_init(oc_gradient_t *gradient, oc_arena_t *arena,
-                                        uint32_t width_px, uint32_t height_px, float sigma_px);
+OC_CHECKED oc_status_t oc_gradient_init(oc_gradient_t *gradient, oc_arena_t *arena, uint32_t width_px,
+                                        uint32_t height_px, float sigma_px);
 
 /* Fill dx, dy and magnitude (thesis 3.3 step 1).
  *

@@ -17,7 +17,7 @@
 
 /* A pair of rays straighter than this is not looked at; the final test is on
  * the fitted angles (min_bend_rad). */
-#define COARSE_COS_BEND 0.955f
+#define COARSE_COS_BEND 0.92f
 
 static const float kTurn = 2.0f * PI;
 
@@ -36,7 +36,7 @@ oc_judoca_params_t oc_judoca_defaults(void)
         .max_apex_sigma_px = 1.0f,
         .min_distance_px = 3.0f,
         .max_junctions = 600,
-        .max_candidates = 16384,
+        .max_candidates = 8192,
         .spread_cell_px = 40,
         .method = OC_JUDOCA_REFINED,
     };
@@ -52,17 +52,14 @@ bool oc_judoca_params_are_valid(const oc_judoca_params_t *p)
     OC_ASSERT(p);
 
     return in_range(p->sigma_px, OC_GRADIENT_MIN_SIGMA_PX, OC_GRADIENT_MAX_SIGMA_PX) &&
-           (p->t_b == 0.0f || in_range(p->t_b, 0.5f, 100.0f)) &&
-           in_range(p->t_b_noise_k, 1.0f, 20.0f) && in_range(p->s_j, 0.3f, 1.0f) &&
-           p->lambda_px >= 6 && p->lambda_px <= OC_JUDOCA_MAX_LAMBDA_PX &&
-           p->lambda_min_px >= 4 && p->lambda_min_px <= p->lambda_px &&
-           in_range(p->min_angle_rad, 0.1f, 1.0f) && in_range(p->min_bend_rad, 0.05f, 1.0f) &&
-           in_range(p->max_rms_px, 0.1f, 2.0f) && in_range(p->max_apex_sigma_px, 0.1f, 3.0f) &&
-           in_range(p->min_distance_px, 1.0f, 20.0f) && p->max_junctions >= 1 &&
-           p->max_junctions <= OC_MAX_JUNCTIONS && p->max_candidates >= 16 &&
+           (p->t_b == 0.0f || in_range(p->t_b, 0.5f, 100.0f)) && in_range(p->t_b_noise_k, 1.0f, 20.0f) &&
+           in_range(p->s_j, 0.3f, 1.0f) && p->lambda_px >= 6 && p->lambda_px <= OC_JUDOCA_MAX_LAMBDA_PX &&
+           p->lambda_min_px >= 4 && p->lambda_min_px <= p->lambda_px && in_range(p->min_angle_rad, 0.1f, 1.0f) &&
+           in_range(p->min_bend_rad, 0.05f, 1.0f) && in_range(p->max_rms_px, 0.1f, 2.0f) &&
+           in_range(p->max_apex_sigma_px, 0.1f, 3.0f) && in_range(p->min_distance_px, 1.0f, 20.0f) &&
+           p->max_junctions >= 1 && p->max_junctions <= OC_MAX_JUNCTIONS && p->max_candidates >= 16 &&
            p->max_candidates <= OC_JUDOCA_MAX_CANDIDATES && p->spread_cell_px >= 8 &&
-           p->spread_cell_px <= OC_MAX_IMAGE_SIDE &&
-           (p->method == OC_JUDOCA_REFINED || p->method == OC_JUDOCA_THESIS);
+           p->spread_cell_px <= OC_MAX_IMAGE_SIDE && (p->method == OC_JUDOCA_REFINED || p->method == OC_JUDOCA_THESIS);
 }
 
 /* The maps carry a border that no ray leaves, so rays need no bounds test. */
@@ -76,8 +73,7 @@ typedef struct judoca_pieces {
     size_t ray, map, prescore, peak, found, rank, cell; /* bytes */
 } judoca_pieces_t;
 
-static judoca_pieces_t judoca_measure(uint32_t width_px, uint32_t height_px,
-                                      const oc_judoca_params_t *params)
+static judoca_pieces_t judoca_measure(uint32_t width_px, uint32_t height_px, const oc_judoca_params_t *params)
 {
     const size_t border = judoca_border(params);
     const size_t area = (width_px + 2u * border) * (height_px + 2u * border);
@@ -94,8 +90,7 @@ static judoca_pieces_t judoca_measure(uint32_t width_px, uint32_t height_px,
     };
 }
 
-size_t oc_judoca_size_bytes(uint32_t width_px, uint32_t height_px,
-                            const oc_judoca_params_t *params)
+size_t oc_judoca_size_bytes(uint32_t width_px, uint32_t height_px, const oc_judoca_params_t *params)
 {
     OC_ASSERT(params);
 
@@ -103,9 +98,8 @@ size_t oc_judoca_size_bytes(uint32_t width_px, uint32_t height_px,
     if (gradient == 0 || !oc_judoca_params_are_valid(params)) return 0;
 
     const judoca_pieces_t p = judoca_measure(width_px, height_px, params);
-    return OC_ARENA_ALIGN + gradient + oc_arena_cost(p.ray) + oc_arena_cost(p.map) +
-           oc_arena_cost(p.prescore) + oc_arena_cost(p.peak) + oc_arena_cost(p.found) +
-           oc_arena_cost(p.rank) + oc_arena_cost(p.cell);
+    return OC_ARENA_ALIGN + gradient + oc_arena_cost(p.ray) + oc_arena_cost(p.map) + oc_arena_cost(p.prescore) +
+           oc_arena_cost(p.peak) + oc_arena_cost(p.found) + oc_arena_cost(p.rank) + oc_arena_cost(p.cell);
 }
 
 /* Sector bit of a gradient direction. */
@@ -131,6 +125,7 @@ static void judoca_fill_ray(oc_judoca_ray_t *ray, int32_t x, int32_t y, float s_
         ray->offset[ray->n++] = dy * pitch + dx;
     }
     ray->n_needed = (uint8_t)ceilf(s_j * (float)ray->n - 1e-4f);
+    ray->per_hit = ray->n > 0 ? 0.5f / (float)ray->n : 0.0f;
     ray->ux = (float)x / length;
     ray->uy = (float)y / length;
     ray->bit = judoca_bit(angle + 0.5f * PI);
@@ -158,16 +153,15 @@ static void judoca_build_rays(oc_judoca_ws_t *ws, int32_t radius)
     }
 }
 
-oc_status_t oc_judoca_init(oc_judoca_ws_t *ws, oc_arena_t *arena, uint32_t width_px,
-                           uint32_t height_px, const oc_judoca_params_t *params)
+oc_status_t oc_judoca_init(oc_judoca_ws_t *ws, oc_arena_t *arena, uint32_t width_px, uint32_t height_px,
+                           const oc_judoca_params_t *params)
 {
     OC_ASSERT(ws && arena && params);
 
     if (oc_judoca_size_bytes(width_px, height_px, params) == 0) return OC_E_ARG;
 
     memset(ws, 0, sizeof *ws);
-    oc_status_t status =
-        oc_gradient_init(&ws->gradient, arena, width_px, height_px, params->sigma_px);
+    oc_status_t status = oc_gradient_init(&ws->gradient, arena, width_px, height_px, params->sigma_px);
     if (status != OC_OK) return status;
 
     const judoca_pieces_t p = judoca_measure(width_px, height_px, params);
@@ -188,8 +182,7 @@ oc_status_t oc_judoca_init(oc_judoca_ws_t *ws, oc_arena_t *arena, uint32_t width
     ws->cell = piece[6];
     ws->map_border = (int32_t)judoca_border(params);
     ws->map_pitch = (int32_t)width_px + 2 * ws->map_border;
-    judoca_build_rays(ws, params->method == OC_JUDOCA_THESIS ? params->lambda_px
-                                                             : params->lambda_min_px);
+    judoca_build_rays(ws, params->method == OC_JUDOCA_THESIS ? params->lambda_px : params->lambda_min_px);
     return OC_OK;
 }
 
@@ -241,23 +234,36 @@ static uint8_t judoca_test_ray(const oc_judoca_ray_t *ray, uint32_t bit, const u
     return (uint8_t)hits;
 }
 
-/* Add a run of neighbouring accepted rays as one seed: the mean direction
- * weighted by hits. Anchor points of one edge are merged this way. */
-static uint32_t judoca_add_run(const oc_judoca_ws_t *ws, const uint8_t *hits, uint32_t first,
-                               uint32_t length, float side, oc_fit_seed_t seed[], uint32_t n)
+/* Accepted rays of one gradient sign, in order of angle. */
+typedef struct judoca_accepted {
+    uint32_t n;
+    uint8_t ray[OC_JUDOCA_MAX_RAYS];
+    uint8_t hits[OC_JUDOCA_MAX_RAYS];
+} judoca_accepted_t;
+static_assert(OC_JUDOCA_MAX_RAYS <= UINT8_MAX, "judoca_accepted_t counts rays in 8 bits");
+
+/* A run of neighbouring accepted rays: anchor points of one edge. */
+typedef struct judoca_run {
+    float sx, sy, best;
+} judoca_run_t;
+
+static void judoca_extend_run(judoca_run_t *run, const oc_judoca_ray_t *ray, uint32_t hits)
 {
-    float sx = 0, sy = 0, best = 0;
-    for (uint32_t i = first; i < first + length; i++) {
-        const oc_judoca_ray_t *ray = &ws->ray[i % ws->n_rays];
-        const float share = (float)hits[i % ws->n_rays] / (2.0f * (float)ray->n);
-        /* Squares favour the ray that lies on the edge over its neighbours. */
-        sx += share * share * ray->ux;
-        sy += share * share * ray->uy;
-        best = fmaxf(best, share);
-    }
-    const float norm = sqrtf(sx * sx + sy * sy);
+    const float share = (float)hits * ray->per_hit;
+    /* Squares favour the ray that lies on the edge over its neighbours. */
+    run->sx += share * share * ray->ux;
+    run->sy += share * share * ray->uy;
+    if (share > run->best) run->best = share;
+}
+
+/* Close a run: one more seed in its mean direction, kept in order of strength. */
+static uint32_t judoca_close_run(judoca_run_t *run, float side, oc_fit_seed_t seed[], uint32_t n)
+{
+    const float best = run->best;
+    const float norm = sqrtf(run->sx * run->sx + run->sy * run->sy);
+    const oc_fit_seed_t made = {run->sx / norm, run->sy / norm, side, best};
+    *run = (judoca_run_t){0.0f, 0.0f, 0.0f};
     if (!(norm > 1e-3f)) return n; /* all round: texture */
-    const oc_fit_seed_t made = {sx / norm, sy / norm, side, best};
 
     if (n == OC_FIT_MAX_BRANCHES) {
         if (seed[n - 1].strength >= best) return n;
@@ -269,44 +275,55 @@ static uint32_t judoca_add_run(const oc_judoca_ws_t *ws, const uint8_t *hits, ui
     return n + 1;
 }
 
-/* Split the accepted rays of one gradient sign into runs. */
-static uint32_t judoca_collect_runs(const oc_judoca_ws_t *ws, const uint8_t *hits, float side,
+/* Is this entry of the circular list not the neighbour of the one before? */
+static bool judoca_starts_run(const judoca_accepted_t *a, uint32_t i, uint32_t n_rays)
+{
+    const uint32_t before = a->ray[i == 0 ? a->n - 1u : i - 1u];
+    return a->ray[i] != (before + 1u == n_rays ? 0 : before + 1u);
+}
+
+static uint32_t judoca_collect_runs(const oc_judoca_ws_t *ws, const judoca_accepted_t *a, float side,
                                     oc_fit_seed_t seed[], uint32_t n)
 {
-    uint32_t gap = 0;
-    while (gap < ws->n_rays && hits[gap]) gap++;
-    if (gap == ws->n_rays) return n; /* edges in every direction: texture, no junction */
+    uint32_t first = 0;
+    while (first < a->n && !judoca_starts_run(a, first, ws->n_rays)) first++;
+    if (first == a->n) return n; /* none, or edges in every direction: texture */
 
-    uint32_t length = 0;
-    for (uint32_t i = gap + 1; i <= gap + ws->n_rays; i++) {
-        if (hits[i % ws->n_rays]) {
-            length++;
-        } else if (length > 0) {
-            n = judoca_add_run(ws, hits, i - length, length, side, seed, n);
-            length = 0;
+    judoca_run_t run = {0.0f, 0.0f, 0.0f};
+    uint32_t i = first;
+    do {
+        judoca_extend_run(&run, &ws->ray[a->ray[i]], a->hits[i]);
+        i = i + 1u == a->n ? 0 : i + 1u;
+        if (i == first || judoca_starts_run(a, i, ws->n_rays)) {
+            n = judoca_close_run(&run, side, seed, n);
         }
-    }
+    } while (i != first);
     return n;
 }
 
-/* Branch directions at a place of the padded map, strongest first. */
-static uint32_t judoca_seeds(const oc_judoca_ws_t *ws, const uint32_t *centre,
-                             oc_fit_seed_t seed[OC_FIT_MAX_BRANCHES])
+static void judoca_accept(judoca_accepted_t *a, const oc_judoca_ray_t *ray, uint32_t index, uint32_t bit,
+                          const uint32_t *centre)
 {
-    uint8_t hits[2][OC_JUDOCA_MAX_RAYS];
-    uint32_t any[2] = {0, 0};
+    const uint8_t hits = judoca_test_ray(ray, bit, centre);
+    if (hits == 0) return;
+    a->ray[a->n] = (uint8_t)index;
+    a->hits[a->n++] = hits;
+}
+
+/* Branch directions at a place of the padded map, strongest first. */
+static uint32_t judoca_seeds(const oc_judoca_ws_t *ws, const uint32_t *centre, oc_fit_seed_t seed[OC_FIT_MAX_BRANCHES])
+{
+    judoca_accepted_t front, back;
+    front.n = back.n = 0;
     for (uint32_t i = 0; i < ws->n_rays; i++) {
         const oc_judoca_ray_t *ray = &ws->ray[i];
         const uint32_t anchor = centre[ray->offset[0]];
-        hits[0][i] = anchor & ray->bit ? judoca_test_ray(ray, ray->bit, centre) : 0;
-        hits[1][i] = anchor & ray->bit_back ? judoca_test_ray(ray, ray->bit_back, centre) : 0;
-        any[0] += hits[0][i];
-        any[1] += hits[1][i];
+        if (!(anchor & (ray->bit | ray->bit_back))) continue;
+        if (anchor & ray->bit) judoca_accept(&front, ray, i, ray->bit, centre);
+        if (anchor & ray->bit_back) judoca_accept(&back, ray, i, ray->bit_back, centre);
     }
-    uint32_t n = 0;
-    if (any[0]) n = judoca_collect_runs(ws, hits[0], 1.0f, seed, n);
-    if (any[1]) n = judoca_collect_runs(ws, hits[1], -1.0f, seed, n);
-    return n;
+    const uint32_t n = judoca_collect_runs(ws, &front, 1.0f, seed, 0);
+    return judoca_collect_runs(ws, &back, -1.0f, seed, n);
 }
 
 /* Strength of the best pair of seeds that is neither one branch nor a line;
@@ -337,8 +354,7 @@ static void judoca_prescore(oc_judoca_ws_t *ws)
 
     for (uint32_t y = 0; y < g->height_px; y++) {
         const size_t row = (size_t)y * g->width_px;
-        const size_t start =
-            (size_t)(((int32_t)y + ws->map_border) * ws->map_pitch + ws->map_border);
+        const size_t start = (size_t)(((int32_t)y + ws->map_border) * ws->map_pitch + ws->map_border);
         for (uint32_t x = 0; x < g->width_px; x++) {
             if (!(g->edge[row + x] & OC_EDGE_THIN)) continue;
 
@@ -372,8 +388,7 @@ static bool judoca_fit_place(oc_judoca_ws_t *ws, const oc_fit_rules_t *rules, in
     ws->prescore[at] = 1;
 
     n = judoca_seeds(ws, ws->oriented + at, seed);
-    if (n >= 2 &&
-        oc_judoca_fit_begin(&ws->gradient, rules, (float)x, (float)y, seed, n, &again)) {
+    if (n >= 2 && oc_judoca_fit_begin(&ws->gradient, rules, (float)x, (float)y, seed, n, &again)) {
         fit = again;
     }
     return oc_judoca_fit_finish(&ws->gradient, rules, &fit, &ws->found[ws->stats.n_found]);
@@ -382,17 +397,16 @@ static bool judoca_fit_place(oc_judoca_ws_t *ws, const oc_fit_rules_t *rules, in
 static void judoca_fit_places(oc_judoca_ws_t *ws)
 {
     const oc_judoca_params_t *p = &ws->params;
-    const oc_fit_rules_t rules = {(float)p->lambda_px, (float)p->lambda_min_px, p->s_j,
-                                  ws->stats.t_b,       ws->cos_min_angle,       p->min_bend_rad,
-                                  p->max_rms_px,       p->max_apex_sigma_px};
+    const oc_fit_rules_t rules = {(float)p->lambda_px, (float)p->lambda_min_px, p->s_j,        ws->stats.t_b,
+                                  ws->cos_min_angle,   p->min_bend_rad,         p->max_rms_px, p->max_apex_sigma_px};
     judoca_clear(ws, ws->prescore);
     for (uint32_t i = 0; i < ws->stats.n_fitted && ws->stats.n_found < OC_JUDOCA_MAX_FOUND; i++) {
         if (judoca_fit_place(ws, &rules, (int32_t)ws->place[i])) ws->stats.n_found++;
     }
 }
 
-oc_status_t oc_judoca_detect(oc_judoca_ws_t *ws, const oc_image_t *grey, oc_junction_t out[],
-                             uint32_t cap, uint32_t *count)
+oc_status_t oc_judoca_detect(oc_judoca_ws_t *ws, const oc_image_t *grey, oc_junction_t out[], uint32_t cap,
+                             uint32_t *count)
 {
     OC_ASSERT(ws && ws->oriented && grey && count && (out || cap == 0));
 

@@ -34,39 +34,43 @@ typedef enum oc_judoca_method {
     OC_JUDOCA_THESIS = 1   /* thesis 3.3: integer apex, chord angles, strength only */
 } oc_judoca_method_t;
 
-/* Tunables. Start from oc_judoca_defaults() and change what you must. */
+/* Tunables: unit, legal range, default. Start from oc_judoca_defaults() and
+ * change what you must. */
 typedef struct oc_judoca_params {
-    float sigma_px;      /* of the Gaussian before the derivative, 0.6..3; default 1.2 */
-    float t_b;           /* threshold of the thick map B, grey levels per px of the unit-gain
-                          * derivative, 0.5..100; 0 = from the image's own noise (t_b_noise_k) */
-    float t_b_noise_k;   /* t_b = k * sd of one derivative component, 1..20, used when t_b is 0;
-                          * the result is kept in [OC_JUDOCA_MIN_T_B, OC_JUDOCA_MAX_T_B] */
-    float s_j;           /* least share of B+ pixels along a branch (thesis s_J), 0.3..1 */
-    int32_t lambda_px;   /* longest branch, 6..OC_JUDOCA_MAX_LAMBDA_PX (thesis lambda) */
-    int32_t lambda_min_px; /* shortest branch, 4..lambda_px; equal to lambda_px = thesis */
-    float min_angle_rad; /* two branches closer than this are one, 0.1..1 */
-    float min_bend_rad;  /* a pair whose angle is nearer to pi than this is a line, 0.05..1 */
-    float max_rms_px;    /* an edge that leaves its straight line by more is no branch, 0.1..2 */
-    float max_apex_sigma_px; /* a less certain apex is dropped, 0.1..3 */
-    float min_distance_px;   /* of two nearer apices the better stays, 1..20 */
-    uint32_t max_junctions;  /* kept per image, 1..OC_MAX_JUNCTIONS */
-    uint32_t max_candidates; /* fitted per image, best pre-score first,
-                              * 16..OC_JUDOCA_MAX_CANDIDATES */
-    uint32_t spread_cell_px; /* when the limit binds, cells of this side share it, 8..4096 */
+    float sigma_px;          /* of the Gaussian before the derivative, 0.6..3; 1.2 */
+    float t_b;               /* threshold of the thick map B, grey levels per px of the unit-gain
+                        * derivative, 0.5..100; 6. 0 = from the image's own noise */
+    float t_b_noise_k;       /* when t_b is 0: t_b = k * oc_gradient_noise(), kept within
+                        * [OC_JUDOCA_MIN_T_B, OC_JUDOCA_MAX_T_B]; 1..20; 5 */
+    float s_j;               /* least share of a branch that lies on an edge (thesis s_J), 0.3..1; 0.6 */
+    int32_t lambda_px;       /* longest branch (thesis lambda), 6..OC_JUDOCA_MAX_LAMBDA_PX; 10. Acute
+                        * pairs are followed further, by what blur spoils near their tip */
+    int32_t lambda_min_px;   /* shortest branch, 4..lambda_px; 6. lambda_px = all of one length */
+    float min_angle_rad;     /* two branches closer than this are one, 0.1..1; 0.26 */
+    float min_bend_rad;      /* a pair this near to pi is a line, not a corner, 0.05..1; 0.26 */
+    float max_rms_px;        /* an edge that leaves its line by more is no branch, 0.1..2; 0.6 */
+    float max_apex_sigma_px; /* an apex less certain than this is dropped, 0.1..3; 1 */
+    float min_distance_px;   /* of two apices nearer than this the better stays, 1..20; 3 */
+    uint32_t max_junctions;  /* kept per image, 1..OC_MAX_JUNCTIONS; 600 */
+    uint32_t max_candidates; /* places fitted per image, those of best pre-score,
+                              * 16..OC_JUDOCA_MAX_CANDIDATES; 8192. Bounds the time */
+    uint32_t spread_cell_px; /* side of the cells that share max_junctions when it
+                              * binds, 8..4096; 40 */
     oc_judoca_method_t method;
 } oc_judoca_params_t;
 
+/* Bounds of a threshold taken from the noise, grey levels per px. */
 #define OC_JUDOCA_MIN_T_B 2.0f
 #define OC_JUDOCA_MAX_T_B 20.0f
 
 /* What one call of oc_judoca_detect met; counts of pixels, places, junctions. */
 typedef struct oc_judoca_stats {
-    float t_b;              /* threshold in force */
-    uint32_t n_thin;        /* pixels of B+ */
-    uint32_t n_places;      /* places that looked like a junction */
-    uint32_t n_fitted;      /* of these, within max_candidates */
-    uint32_t n_found;       /* junctions before max_junctions and cap */
-    uint32_t n_dropped;     /* junctions lost to max_junctions or cap */
+    float t_b;          /* threshold in force */
+    uint32_t n_thin;    /* pixels of B+ */
+    uint32_t n_places;  /* places that looked like a junction */
+    uint32_t n_fitted;  /* of these, within max_candidates */
+    uint32_t n_found;   /* junctions before max_junctions and cap */
+    uint32_t n_dropped; /* junctions lost to max_junctions or cap */
 } oc_judoca_stats_t;
 
 /* One ray: from the centre to a pixel of the circle. */
@@ -76,6 +80,7 @@ typedef struct oc_judoca_ray {
     uint16_t bit;      /* of the oriented map: gradient on the left of the ray */
     uint16_t bit_back; /* the same edge with the opposite gradient */
     float ux, uy;      /* unit vector */
+    float per_hit;     /* share of its samples, half of one */
     float angle_rad;
     int32_t offset[OC_JUDOCA_MAX_LAMBDA_PX]; /* into a padded map */
 } oc_judoca_ray_t;
@@ -114,16 +119,15 @@ bool oc_judoca_params_are_valid(const oc_judoca_params_t *params);
 
 /* Bytes to give to oc_judoca_init, padding included; 0 when the sides are not
  * within OC_MIN_IMAGE_SIDE..OC_MAX_IMAGE_SIDE or params are not valid. */
-size_t oc_judoca_size_bytes(uint32_t width_px, uint32_t height_px,
-                            const oc_judoca_params_t *params);
+size_t oc_judoca_size_bytes(uint32_t width_px, uint32_t height_px, const oc_judoca_params_t *params);
 
 /* Take maps for images of exactly this size from the arena and build the ray
  * tables. params are copied.
  *
  * OC_E_ARG for a bad size or params, OC_E_SPACE when the arena is too small;
  * ws is then not usable. */
-OC_CHECKED oc_status_t oc_judoca_init(oc_judoca_ws_t *ws, oc_arena_t *arena, uint32_t width_px,
-                                      uint32_t height_px, const oc_judoca_params_t *params);
+OC_CHECKED oc_status_t oc_judoca_init(oc_judoca_ws_t *ws, oc_arena_t *arena, uint32_t width_px, uint32_t height_px,
+                                      const oc_judoca_params_t *params);
 
 /* Find the junctions of a grey image (thesis 3.3; what is added is in
  * docs/design.md: growing branches, line fits, sub-pixel apex).
@@ -140,8 +144,8 @@ OC_CHECKED oc_status_t oc_judoca_init(oc_judoca_ws_t *ws, oc_arena_t *arena, uin
  * stride and whatever was detected before.
  *
  * O(width * height * rays) in the worst case, about 5 % of it on photographs. */
-OC_CHECKED oc_status_t oc_judoca_detect(oc_judoca_ws_t *ws, const oc_image_t *grey,
-                                        oc_junction_t out[], uint32_t cap, uint32_t *count);
+OC_CHECKED oc_status_t oc_judoca_detect(oc_judoca_ws_t *ws, const oc_image_t *grey, oc_junction_t out[], uint32_t cap,
+                                        uint32_t *count);
 
 #ifdef __cplusplus
 }

@@ -33,7 +33,7 @@
 
 /* An obtuse pair bends each other's ridge less; what lies within INNER +
  * OBTUSE cot is kept, for short branches need it, but counts little. */
-#define OBTUSE_PX 2.0f
+#define OBTUSE_PX 1.25f
 #define SOFT_MAX_PX 5.0f
 #define SOFT_WEIGHT 0.15f
 
@@ -55,7 +55,7 @@ typedef struct fit_samples {
     float across[MAX_SAMPLES]; /* minor coordinate, sub-pixel */
     float value[MAX_SAMPLES];  /* derivative across the branch */
     float weight[MAX_SAMPLES];
-    float t[MAX_SAMPLES];      /* distance from the apex */
+    float t[MAX_SAMPLES];        /* distance from the apex */
     uint32_t tried[MAX_SAMPLES]; /* n_tried when this one was met */
 } fit_samples_t;
 
@@ -90,8 +90,8 @@ static float fit_sin_between(const oc_fit_seed_t *a, const oc_fit_seed_t *b)
     return fabsf(a->ux * b->uy - a->uy * b->ux);
 }
 
-static fit_walk_t fit_walk_begin(const oc_gradient_t *gradient, const oc_fit_seed_t *seed,
-                                 float x_px, float y_px, float t_b, int32_t reach)
+static fit_walk_t fit_walk_begin(const oc_gradient_t *gradient, const oc_fit_seed_t *seed, float x_px, float y_px,
+                                 float t_b, int32_t reach)
 {
     const float ux = seed->ux;
     const float uy = seed->uy;
@@ -156,8 +156,8 @@ static bool fit_walk_sample(const fit_walk_t *walk, int32_t major, float *across
 
 /* Collect edge points from r0 outwards: all up to the shortest length, then
  * as far as no two in a row are missing. */
-static void fit_walk_collect(const fit_walk_t *walk, float shortest_px, float longest_px,
-                             float r0, fit_samples_t *samples)
+static void fit_walk_collect(const fit_walk_t *walk, float shortest_px, float longest_px, float r0,
+                             fit_samples_t *samples)
 {
     samples->n = 0;
     samples->n_tried = 0;
@@ -186,8 +186,7 @@ static void fit_walk_collect(const fit_walk_t *walk, float shortest_px, float lo
 }
 
 /* Straight line through the first n samples, least squares across the major axis. */
-static bool fit_line_solve(const fit_walk_t *walk, const fit_samples_t *samples, uint32_t n,
-                           oc_fit_line_t *line)
+static bool fit_line_solve(const fit_walk_t *walk, const fit_samples_t *samples, uint32_t n, oc_fit_line_t *line)
 {
     float sum = 0, sw = 0, sa = 0, sc = 0;
     for (uint32_t i = 0; i < n; i++) {
@@ -246,12 +245,10 @@ static float fit_soft_radius(const oc_fit_t *fit, uint32_t self)
 
 /* Follow one seed from r0 and fit its line; the longest piece that stays
  * straight wins. */
-static bool fit_follow_from(const oc_gradient_t *gradient, const oc_fit_rules_t *rules,
-                       const oc_fit_t *fit, uint32_t i, float r0, const fit_reach_t *reach,
-                       oc_fit_line_t *line)
+static bool fit_follow_from(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit, uint32_t i,
+                            float r0, const fit_reach_t *reach, oc_fit_line_t *line)
 {
-    fit_walk_t walk = fit_walk_begin(gradient, &fit->seed[i], fit->x_px, fit->y_px,
-                                           rules->t_b, reach->across_px);
+    fit_walk_t walk = fit_walk_begin(gradient, &fit->seed[i], fit->x_px, fit->y_px, rules->t_b, reach->across_px);
     walk.soft_px = fit_soft_radius(fit, i);
     const float shortest = fmaxf(rules->lambda_min_px, r0 + SPAN_PX);
     /* What an acute pair loses at the tip it may take further out. */
@@ -276,13 +273,11 @@ static bool fit_follow_from(const oc_gradient_t *gradient, const oc_fit_rules_t 
 
 /* Follow one seed from the radius that clears its neighbours; where the edge
  * does not reach out that far, from near the apex. */
-static bool fit_follow(const oc_gradient_t *gradient, const oc_fit_rules_t *rules,
-                       const oc_fit_t *fit, uint32_t i, float inner_px, const fit_reach_t *reach,
-                       oc_fit_line_t *line)
+static bool fit_follow(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit, uint32_t i,
+                       float inner_px, const fit_reach_t *reach, oc_fit_line_t *line)
 {
     if (fit_follow_from(gradient, rules, fit, i, inner_px, reach, line)) return true;
-    return inner_px > INNER_PX + 1.0f &&
-           fit_follow_from(gradient, rules, fit, i, INNER_PX, reach, line);
+    return inner_px > INNER_PX + 1.0f && fit_follow_from(gradient, rules, fit, i, INNER_PX, reach, line);
 }
 
 /* Move the apex to the weighted least-squares point of all lines. A line
@@ -364,8 +359,7 @@ static bool fit_drop_stray(oc_fit_t *fit)
     float most = 0.0f;
     for (uint32_t i = 0; i < fit->n; i++) {
         const oc_fit_line_t *line = &fit->line[i];
-        const float miss =
-            fabsf((line->px - fit->x_px) * line->uy - (line->py - fit->y_px) * line->ux);
+        const float miss = fabsf((line->px - fit->x_px) * line->uy - (line->py - fit->y_px) * line->ux);
         if (miss > most) {
             most = miss;
             worst = i;
@@ -391,8 +385,8 @@ static bool fit_is_near(const oc_fit_t *fit, float farthest_px)
 }
 
 /* Once round: follow all branches from the apex, then move the apex. */
-static bool fit_pass(const oc_gradient_t *gradient, const oc_fit_rules_t *rules,
-                     const fit_reach_t *reach, oc_fit_t *fit)
+static bool fit_pass(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const fit_reach_t *reach,
+                     oc_fit_t *fit)
 {
     float inner[OC_FIT_MAX_BRANCHES];
     for (uint32_t i = 0; i < fit->n; i++) {
@@ -417,8 +411,8 @@ static bool fit_pass(const oc_gradient_t *gradient, const oc_fit_rules_t *rules,
     return fit_is_near(fit, rules->lambda_px - 2.0f);
 }
 
-bool oc_judoca_fit_begin(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, float x_px,
-                         float y_px, const oc_fit_seed_t seed[], uint32_t n_seeds, oc_fit_t *fit)
+bool oc_judoca_fit_begin(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, float x_px, float y_px,
+                         const oc_fit_seed_t seed[], uint32_t n_seeds, oc_fit_t *fit)
 {
     OC_ASSERT(gradient && rules && seed && fit);
 
@@ -441,8 +435,8 @@ static float fit_pair_score(const oc_fit_t *fit, uint32_t i, uint32_t j, float c
     const float contrast = fminf(a->contrast, b->contrast) / (float)OC_GRADIENT_ONE;
     const float share = fminf(a->share, b->share);
     const float length = fminf(a->length_px, b->length_px);
-    return contrast / (contrast + HALF_CONTRAST) * share *
-           fit_sin_between(&fit->seed[i], &fit->seed[j]) * sqrtf(length);
+    return contrast / (contrast + HALF_CONTRAST) * share * fit_sin_between(&fit->seed[i], &fit->seed[j]) *
+           sqrtf(length);
 }
 
 static float fit_score(const oc_fit_t *fit, float cos_min_bend)
@@ -470,21 +464,18 @@ void oc_judoca_sort_branches(oc_junction_t *junction)
 
 void oc_judoca_set_kind(oc_junction_t *junction, float tolerance_rad)
 {
-    static const uint8_t by_count[5] = {OC_KIND_OTHER, OC_KIND_OTHER, OC_KIND_L, OC_KIND_Y,
-                                        OC_KIND_X};
+    static const uint8_t by_count[5] = {OC_KIND_OTHER, OC_KIND_OTHER, OC_KIND_L, OC_KIND_Y, OC_KIND_X};
     const uint32_t n = junction->n_branches;
     junction->kind = n < 5 ? by_count[n] : OC_KIND_OTHER;
     if (n != 3) return;
 
     for (uint32_t i = 0; i < 3; i++) {
-        float between =
-            fabsf(junction->branch[i].angle_rad - junction->branch[(i + 1) % 3].angle_rad);
+        float between = fabsf(junction->branch[i].angle_rad - junction->branch[(i + 1) % 3].angle_rad);
         if (fabsf(PI - between) < tolerance_rad) junction->kind = OC_KIND_T;
     }
 }
 
-static void fit_write(const oc_fit_t *fit, float score, float tolerance_rad,
-                      oc_junction_t *junction)
+static void fit_write(const oc_fit_t *fit, float score, float tolerance_rad, oc_junction_t *junction)
 {
     memset(junction, 0, sizeof *junction);
     junction->x_px = fit->x_px;
@@ -495,15 +486,14 @@ static void fit_write(const oc_fit_t *fit, float score, float tolerance_rad,
         float angle = atan2f(line->uy, line->ux);
         if (angle < 0.0f) angle += 2.0f * PI;
         if (angle >= 2.0f * PI) angle = 0.0f;
-        junction->branch[junction->n_branches++] =
-            (oc_branch_t){angle, line->length_px, line->share};
+        junction->branch[junction->n_branches++] = (oc_branch_t){angle, line->length_px, line->share};
     }
     oc_judoca_sort_branches(junction);
     oc_judoca_set_kind(junction, tolerance_rad);
 }
 
-bool oc_judoca_fit_finish(const oc_gradient_t *gradient, const oc_fit_rules_t *rules,
-                          oc_fit_t *fit, oc_junction_t *junction)
+bool oc_judoca_fit_finish(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, oc_fit_t *fit,
+                          oc_junction_t *junction)
 {
     OC_ASSERT(gradient && rules && fit && junction);
 

@@ -47,8 +47,8 @@ typedef struct oc_fit_line {
 
 /* A fit under way. */
 typedef struct oc_fit {
-    float x_px, y_px;    /* apex */
-    float sigma_px;      /* larger standard deviation of the apex */
+    float x_px, y_px;           /* apex */
+    float sigma_px;             /* larger standard deviation of the apex */
     float from_x_px, from_y_px; /* pixel where the junction was seen */
     uint32_t n;
     oc_fit_seed_t seed[OC_FIT_MAX_BRANCHES];
@@ -58,8 +58,8 @@ typedef struct oc_fit {
 /* First look at a junction that was seen near pixel (x_px, y_px): lines over
  * the shortest length, intersected. False when fewer than two branches hold
  * or the apex is not near the pixel; that is most places, and cheap. */
-bool oc_judoca_fit_begin(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, float x_px,
-                         float y_px, const oc_fit_seed_t seed[], uint32_t n_seeds, oc_fit_t *fit);
+bool oc_judoca_fit_begin(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, float x_px, float y_px,
+                         const oc_fit_seed_t seed[], uint32_t n_seeds, oc_fit_t *fit);
 
 /* The rest: each branch is followed from an inner radius that clears its
  * neighbours to at least lambda_min_px and at most lambda_px, the lines are
@@ -70,8 +70,8 @@ bool oc_judoca_fit_begin(const oc_gradient_t *gradient, const oc_fit_rules_t *ru
  *
  * Returns false, junction untouched, when fewer than two branches hold, the
  * two are a straight line, or the apex is uncertain or has run away. */
-bool oc_judoca_fit_finish(const oc_gradient_t *gradient, const oc_fit_rules_t *rules,
-                          oc_fit_t *fit, oc_junction_t *junction);
+bool oc_judoca_fit_finish(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, oc_fit_t *fit,
+                          oc_junction_t *junction);
 
 /* Sort the branches by angle. */
 void oc_judoca_sort_branches(oc_junction_t *junction);

@@ -37,8 +37,7 @@ static bool select_is_peak(const uint16_t *at, int32_t pitch, int32_t radius, ui
 }
 
 /* Visit every place that qualifies; count it per bin, or store it when its bin is high enough. */
-static uint32_t select_scan(oc_judoca_ws_t *ws, int32_t radius, uint32_t histogram[],
-                            uint32_t lowest_bin, uint32_t cap)
+static uint32_t select_scan(oc_judoca_ws_t *ws, int32_t radius, uint32_t histogram[], uint32_t lowest_bin, uint32_t cap)
 {
     const int32_t pitch = ws->map_pitch;
     uint32_t n = 0;

@@ -73,8 +73,7 @@ static float thesis_between(float a, float b)
 
 /* Branches at a place; neighbouring anchor points within the least angle
  * count once, as the strongest of them. */
-static uint32_t thesis_branches(const oc_judoca_ws_t *ws, const uint32_t *centre,
-                                oc_branch_t branch[OC_MAX_BRANCHES])
+static uint32_t thesis_branches(const oc_judoca_ws_t *ws, const uint32_t *centre, oc_branch_t branch[OC_MAX_BRANCHES])
 {
     uint32_t n = 0;
     for (uint32_t i = 0; i < ws->n_rays; i++) {
@@ -83,8 +82,7 @@ static uint32_t thesis_branches(const oc_judoca_ws_t *ws, const uint32_t *centre
 
         const float angle = ws->ray[i].angle_rad;
         uint32_t same = 0;
-        while (same < n &&
-               thesis_between(branch[same].angle_rad, angle) >= ws->params.min_angle_rad) {
+        while (same < n && thesis_between(branch[same].angle_rad, angle) >= ws->params.min_angle_rad) {
             same++;
         }
         if (same == OC_MAX_BRANCHES) continue;

@@ -23,7 +23,8 @@ public:
     oc_packet_head_t head(std::uint8_t type) { return {type, vehicle_, sequence_++}; }
 
     // All parts of a view with n junctions in datagrams of `cap` bytes.
-    std::vector<Bytes> view(std::uint16_t id, int n, std::size_t cap, std::int64_t utime_us = 1000000) {
+    std::vector<Bytes> view(std::uint16_t id, int n, std::size_t cap, std::int64_t utime_us = 1000000)
+    {
         std::mt19937 rng(kSeed + id);
         std::uniform_real_distribution<float> uniform(0, 1);
         std::vector<oc_junction_t> junctions(static_cast<std::size_t>(n));
@@ -60,7 +61,8 @@ public:
         return datagrams;
     }
 
-    Bytes relabel(std::uint16_t view, std::uint16_t first, const std::vector<std::uint8_t> &labels) {
+    Bytes relabel(std::uint16_t view, std::uint16_t first, const std::vector<std::uint8_t> &labels)
+    {
         oc_relabel_t relabel{};
         relabel.view = view, relabel.first = first, relabel.n = static_cast<std::uint16_t>(labels.size());
         std::copy(labels.begin(), labels.end(), relabel.labels);
@@ -70,7 +72,8 @@ public:
         });
     }
 
-    Bytes patch(std::uint16_t view, std::uint8_t quality, const std::vector<std::uint16_t> &blocks, std::uint8_t grey) {
+    Bytes patch(std::uint16_t view, std::uint8_t quality, const std::vector<std::uint16_t> &blocks, std::uint8_t grey)
+    {
         const Bytes pixels(640 * 480, grey);
         const oc_image_t image{pixels.data(), 640, 480, 640, 1};
         const oc_packet_head_t packet = head(OC_PACKET_PATCH);
@@ -83,7 +86,8 @@ public:
         return bytes;
     }
 
-    Bytes overhead(std::uint16_t view, std::int16_t ix, const Bytes &blob) {
+    Bytes overhead(std::uint16_t view, std::int16_t ix, const Bytes &blob)
+    {
         oc_overhead_t tile{};
         tile.view = view, tile.metres_per_pixel = 0.01, tile.tile_px = 64, tile.tile = {ix, 2};
         tile.codec = OC_CODEC_JPEG, tile.n_bytes = static_cast<std::uint16_t>(blob.size()), tile.bytes = blob.data();
@@ -93,7 +97,8 @@ public:
         });
     }
 
-    Bytes announce(std::uint16_t view) {
+    Bytes announce(std::uint16_t view)
+    {
         const oc_announce_t announce{view, 5000000};
         const oc_packet_head_t packet = head(OC_PACKET_ANNOUNCE);
         return encoded([&](std::uint8_t *buf, std::size_t cap, std::size_t *n) {
@@ -101,7 +106,8 @@ public:
         });
     }
 
-    Bytes status(std::uint32_t uptime_s, std::uint16_t n_views, std::uint16_t newest) {
+    Bytes status(std::uint32_t uptime_s, std::uint16_t n_views, std::uint16_t newest)
+    {
         oc_vehicle_status_t status{};
         status.uptime_s = uptime_s, status.n_views = n_views, status.newest_view = newest;
         const oc_packet_head_t packet = head(OC_PACKET_STATUS);
@@ -110,7 +116,8 @@ public:
         });
     }
 
-    Bytes patch_request() {
+    Bytes patch_request()
+    {
         oc_patch_request_t request{};
         request.view = 1, request.quality = 5, request.n_blocks = 1;
         const oc_packet_head_t packet = head(OC_PACKET_PATCH_REQUEST);
@@ -122,7 +129,8 @@ public:
 
 private:
     template <typename Encode>
-    Bytes encoded(const Encode &encode) {
+    Bytes encoded(const Encode &encode)
+    {
         Bytes buf(OC_MAX_DATAGRAM_BYTES);
         std::size_t n = 0;
         const oc_status_t status = encode(buf.data(), buf.size(), &n);
@@ -135,7 +143,8 @@ private:
     std::uint16_t sequence_;
 };
 
-bool same_view(const View &a, const View &b) {
+bool same_view(const View &a, const View &b)
+{
     return a.id == b.id && a.utime_us == b.utime_us && a.junctions.size() == b.junctions.size() &&
            std::memcmp(&a.camera, &b.camera, sizeof a.camera) == 0 &&
            std::equal(a.junctions.begin(), a.junctions.end(), b.junctions.begin(),
@@ -146,15 +155,17 @@ bool same_view(const View &a, const View &b) {
            cv::countNonZero(a.known != b.known) == 0;
 }
 
-bool same_views(const std::map<int, View> &a, const std::map<int, View> &b) {
+bool same_views(const std::map<int, View> &a, const std::map<int, View> &b)
+{
     return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), [](const auto &x, const auto &y) {
                return x.first == y.first && same_view(x.second, y.second);
            });
 }
 
 // Everything a drive sends, with contradictions: labels that change, patches in two qualities.
-std::vector<Bytes> a_drive() {
-    Encoder encoder(1, 65500);  // the numbers wrap on the way
+std::vector<Bytes> a_drive()
+{
+    Encoder encoder(1, 65500); // the numbers wrap on the way
     std::vector<Bytes> all;
     for (std::uint16_t id = 0; id < 6; ++id) {
         for (const Bytes &part : encoder.view(id, 150, 300)) all.push_back(part);
@@ -171,7 +182,8 @@ std::vector<Bytes> a_drive() {
     return all;
 }
 
-TEST(Assemble, makes_views_of_parts_labels_and_pixels) {
+TEST(Assemble, makes_views_of_parts_labels_and_pixels)
+{
     PacketAssembler assembler;
     for (const Bytes &packet : a_drive()) EXPECT_EQ(assembler.feed(packet), FeedResult::kTaken);
     const std::map<int, View> &views = assembler.views();
@@ -197,7 +209,8 @@ TEST(Assemble, makes_views_of_parts_labels_and_pixels) {
     EXPECT_EQ(missing.at(7), 0xffffffffu);
 }
 
-TEST(Assemble, is_a_function_of_the_set_of_packets) {
+TEST(Assemble, is_a_function_of_the_set_of_packets)
+{
     std::vector<Bytes> packets = a_drive();
     PacketAssembler reference;
     for (const Bytes &packet : packets) reference.feed(packet);
@@ -208,7 +221,7 @@ TEST(Assemble, is_a_function_of_the_set_of_packets) {
         for (std::size_t i = 0; i < packets.size(); ++i) {
             assembler.feed(packets[i]);
             if (i % 7 == 0) assembler.feed(packets[i / 2]);
-            if (i % 11 == 0) assembler.views();  // looking in between changes nothing
+            if (i % 11 == 0) assembler.views(); // looking in between changes nothing
         }
         EXPECT_TRUE(same_views(reference.views(), assembler.views())) << "trial " << trial << " seed " << kSeed;
         EXPECT_EQ(reference.missing(), assembler.missing());
@@ -217,7 +230,8 @@ TEST(Assemble, is_a_function_of_the_set_of_packets) {
     }
 }
 
-TEST(Assemble, names_the_parts_that_are_missing) {
+TEST(Assemble, names_the_parts_that_are_missing)
+{
     Encoder encoder;
     const std::vector<Bytes> parts = encoder.view(3, 200, 250);
     ASSERT_GE(parts.size(), 4u);
@@ -239,7 +253,8 @@ TEST(Assemble, names_the_parts_that_are_missing) {
     EXPECT_EQ(headless.missing().at(9), 0xffffffffu) << "a view known by a relabel only";
 }
 
-TEST(Assemble, lets_the_newer_view_of_an_id_win_in_either_order) {
+TEST(Assemble, lets_the_newer_view_of_an_id_win_in_either_order)
+{
     Encoder encoder;
     const std::vector<Bytes> old = encoder.view(1, 30, 1200, 1000000), fresh = encoder.view(1, 40, 1200, 9000000);
     PacketAssembler a, b;
@@ -253,7 +268,8 @@ TEST(Assemble, lets_the_newer_view_of_an_id_win_in_either_order) {
     EXPECT_EQ(a.outdated_parts(), b.outdated_parts());
 }
 
-TEST(Assemble, counts_what_is_foreign_broken_or_none_of_its_business) {
+TEST(Assemble, counts_what_is_foreign_broken_or_none_of_its_business)
+{
     AssembleOptions options;
     options.vehicle = 1;
     PacketAssembler assembler(options);
@@ -276,7 +292,8 @@ TEST(Assemble, counts_what_is_foreign_broken_or_none_of_its_business) {
     EXPECT_EQ(assembler.feed(packet), FeedResult::kKnown);
 }
 
-TEST(Assemble, stops_at_its_bounds) {
+TEST(Assemble, stops_at_its_bounds)
+{
     AssembleOptions options;
     options.max_views = 2, options.max_blocks = 3, options.max_relabels = 1, options.max_tiles = 1;
     PacketAssembler assembler(options);
@@ -292,5 +309,5 @@ TEST(Assemble, stops_at_its_bounds) {
     EXPECT_EQ(assembler.feed(encoder.overhead(1, 2, {1, 2})), FeedResult::kFull);
 }
 
-}  // namespace
-}  // namespace outcrop
+} // namespace
+} // namespace outcrop

@@ -19,27 +19,39 @@ using Eigen::Vector3d;
 constexpr unsigned kSeed = 74;
 constexpr double kPi = 3.14159265358979323846;
 
-std::vector<Vector2d> random_plane(int n, std::mt19937 *rng) {
+std::vector<Vector2d> random_plane(int n, std::mt19937 *rng)
+{
     std::normal_distribution<double> normal;
     std::vector<Vector2d> points;
     for (int i = 0; i < n; ++i) points.emplace_back(2 * normal(*rng), normal(*rng));
     return points;
 }
 
-SitePoint at(const Vector3d &position, double sigma = 1e-4) {
+SitePoint at(const Vector3d &position, double sigma = 1e-4)
+{
     SitePoint point;
     point.position = position;
     point.covariance = sigma * sigma * Eigen::Matrix3d::Identity();
     return point;
 }
 
-std::vector<int> all_of(const std::vector<SitePoint> &points) {
+// Boxes that end at the outermost points.
+BoxOptions tight()
+{
+    BoxOptions options;
+    options.widen_gaps = 0;
+    return options;
+}
+
+std::vector<int> all_of(const std::vector<SitePoint> &points)
+{
     std::vector<int> members;
     for (std::size_t i = 0; i < points.size(); ++i) members.push_back(static_cast<int>(i));
     return members;
 }
 
-TEST(ConvexHull, holds_all_points_and_turns_left) {
+TEST(ConvexHull, holds_all_points_and_turns_left)
+{
     std::mt19937 rng(kSeed);
     for (const int n : {3, 10, 200}) {
         const std::vector<Vector2d> points = random_plane(n, &rng), hull = convex_hull(points);
@@ -55,7 +67,8 @@ TEST(ConvexHull, holds_all_points_and_turns_left) {
     EXPECT_TRUE(convex_hull({}).empty());
 }
 
-TEST(MinAreaRectangle, is_no_larger_than_any_of_ten_thousand_turns) {
+TEST(MinAreaRectangle, is_no_larger_than_any_of_ten_thousand_turns)
+{
     std::mt19937 rng(kSeed);
     for (int trial = 0; trial < 20; ++trial) {
         const std::vector<Vector2d> points = random_plane(4 + trial, &rng);
@@ -85,7 +98,8 @@ TEST(MinAreaRectangle, is_no_larger_than_any_of_ten_thousand_turns) {
 }
 
 // Points of an upright block: size along yaw, across, up.
-std::vector<SitePoint> block(const Vector2d &centre, const Vector3d &size, double yaw) {
+std::vector<SitePoint> block(const Vector2d &centre, const Vector3d &size, double yaw)
+{
     std::vector<SitePoint> points;
     const Vector2d along(std::cos(yaw), std::sin(yaw)), across(-along.y(), along.x());
     for (double u = -0.5; u <= 0.5; u += 0.25)
@@ -97,11 +111,12 @@ std::vector<SitePoint> block(const Vector2d &centre, const Vector3d &size, doubl
     return points;
 }
 
-TEST(FitBox, finds_a_turned_block_standing_on_the_ground) {
+TEST(FitBox, finds_a_turned_block_standing_on_the_ground)
+{
     for (const double degrees : {-80.0, -30.0, 0.0, 25.0, 90.0}) {
         const double yaw = degrees * kPi / 180;
         const std::vector<SitePoint> points = block({1, -2}, {1.2, 0.5, 0.8}, yaw);
-        const Obstacle box = fit_box(points, all_of(points), 10);
+        const Obstacle box = fit_box(points, all_of(points), 10, tight());
         EXPECT_LT((box.obb_centre.head<2>() - Vector2d(1, -2)).norm(), 1e-3);
         EXPECT_NEAR(box.obb_size.x(), 1.2, 2e-3);
         EXPECT_NEAR(box.obb_size.y(), 0.5, 2e-3);
@@ -114,20 +129,22 @@ TEST(FitBox, finds_a_turned_block_standing_on_the_ground) {
     }
 }
 
-TEST(FitBox, is_not_doubled_by_one_wrong_point_but_keeps_a_real_top) {
+TEST(FitBox, is_not_doubled_by_one_wrong_point_but_keeps_a_real_top)
+{
     std::vector<SitePoint> points = block({0, 0}, {1, 1, 1}, 0);
-    const Obstacle clean = fit_box(points, all_of(points), 10);
+    const Obstacle clean = fit_box(points, all_of(points), 10, tight());
     points.push_back(at({2.0, 0.1, 0.4}));
-    const Obstacle robust = fit_box(points, all_of(points), 10);
+    const Obstacle robust = fit_box(points, all_of(points), 10, tight());
     EXPECT_GT(aabb_iou(clean.aabb_min, clean.aabb_max, robust.aabb_min, robust.aabb_max), 0.95);
     EXPECT_GT(robust.obb_size.x() * robust.obb_size.y(), 0.99);
     EXPECT_LT(robust.obb_size.x() * robust.obb_size.y(), 1.1);
 }
 
-TEST(FitBox, widens_by_what_is_uncertain_and_gives_flat_groups_a_size) {
+TEST(FitBox, widens_by_what_is_uncertain_and_gives_flat_groups_a_size)
+{
     std::vector<SitePoint> points = block({0, 0}, {1, 1, 1}, 0);
     for (SitePoint &p : points) p.covariance = 0.02 * 0.02 * Eigen::Matrix3d::Identity();
-    EXPECT_NEAR(fit_box(points, all_of(points), 10).aabb_max.x(), 0.52, 1e-6);
+    EXPECT_NEAR(fit_box(points, all_of(points), 10, tight()).aabb_max.x(), 0.52, 1e-6);
     const std::vector<SitePoint> one = {at({1, 1, 0.5})};
     const Obstacle dot = fit_box(one, {0}, 10);
     EXPECT_GE((dot.aabb_max - dot.aabb_min).minCoeff(), 0.04 - 1e-9);
@@ -135,21 +152,41 @@ TEST(FitBox, widens_by_what_is_uncertain_and_gives_flat_groups_a_size) {
     EXPECT_THROW(fit_box(one, {}, 10), std::invalid_argument);
 }
 
-TEST(AabbIou, is_what_the_volumes_say) {
+TEST(FitBox, goes_on_beyond_the_outermost_points_of_a_sample_as_far_as_the_body_does)
+{
+    // The ends of n uniform samples stop short by 1 / (n + 1) of the body on average; the mean gap makes up for it.
+    std::mt19937 rng(kSeed);
+    std::uniform_real_distribution<double> uniform(0, 1);
+    constexpr int kTrials = 400, kPoints = 15;
+    double with = 0, without = 0;
+    for (int trial = 0; trial < kTrials; ++trial) {
+        std::vector<SitePoint> points;
+        for (int i = 0; i < kPoints; ++i) points.push_back(at({uniform(rng), uniform(rng), uniform(rng)}));
+        with += fit_box(points, all_of(points), 1).aabb_max.x() / kTrials;
+        without += fit_box(points, all_of(points), 1, tight()).aabb_max.x() / kTrials;
+    }
+    EXPECT_NEAR(with, 1.0, 0.015) << "seed " << kSeed;
+    EXPECT_NEAR(without, 1.0 - 1.0 / (kPoints + 1), 0.015) << "seed " << kSeed;
+}
+
+TEST(AabbIou, is_what_the_volumes_say)
+{
     const Vector3d zero(0, 0, 0), one(1, 1, 1), half(0.5, 0, 0), far(5, 5, 5);
     EXPECT_NEAR(aabb_iou(zero, one, zero, one), 1, 1e-12);
     EXPECT_NEAR(aabb_iou(zero, one, half, Vector3d(1.5, 1, 1)), 1.0 / 3, 1e-12);
     EXPECT_EQ(aabb_iou(zero, one, far, far + one), 0);
 }
 
-TEST(MakeBoxes, merges_what_overlaps_and_lets_small_groups_join) {
+TEST(MakeBoxes, merges_what_overlaps_and_lets_small_groups_join)
+{
     std::vector<SitePoint> points = block({0, 0}, {1, 1, 1}, 0);
     const std::vector<SitePoint> second = block({0.4, 0.1}, {0.8, 0.6, 1.2}, 0.4), third = block({3, 0}, {1, 1, 1}, 0);
     Clusters clusters;
     clusters.groups.resize(3);
     for (const auto *part : {&second, &third}) points.insert(points.end(), part->begin(), part->end());
     const int n = static_cast<int>(second.size());
-    for (int i = 0; i < static_cast<int>(points.size()); ++i) clusters.groups[static_cast<std::size_t>(i / n)].push_back(i);
+    for (int i = 0; i < static_cast<int>(points.size()); ++i)
+        clusters.groups[static_cast<std::size_t>(i / n)].push_back(i);
     points.push_back(at({0.1, 0.1, 2}));
     points.push_back(at({0.12, 0.1, 2}));
     points.push_back(at({-3, 0.1, 2}));
@@ -168,7 +205,8 @@ TEST(MakeBoxes, merges_what_overlaps_and_lets_small_groups_join) {
 
 // ---- ground map ----
 
-SiteModel model_with_box() {
+SiteModel model_with_box()
+{
     SiteModel model;
     model.area = {-0.3, 0.6, -0.3, 0.6, 0.3};
     for (int i = 0; i < 8; ++i) {
@@ -178,18 +216,20 @@ SiteModel model_with_box() {
         model.views.push_back(view);
     }
     const std::vector<SitePoint> points = block({0.1, 0.1}, {0.2, 0.1, 0.2}, 0.5);
-    model.obstacles.push_back(fit_box(points, all_of(points), 1));
+    model.obstacles.push_back(fit_box(points, all_of(points), 1, tight()));
     return model;
 }
 
-GroundCode code_at(const GroundMap &map, double x, double y) {
+GroundCode code_at(const GroundMap &map, double x, double y)
+{
     const int col = static_cast<int>((x - map.x_min) / map.metres_per_pixel);
     const int row = static_cast<int>((map.y_max - y) / map.metres_per_pixel);
     return static_cast<GroundCode>(map.codes(row, col));
 }
 
 // Marches along the line of sight in small steps.
-bool is_hidden_brute(const SiteModel &model, const Vector3d &eye, const Vector3d &ground) {
+bool is_hidden_brute(const SiteModel &model, const Vector3d &eye, const Vector3d &ground)
+{
     for (int i = 0; i <= 4000; ++i) {
         const Vector3d p = ground + (eye - ground) * (i / 4000.0);
         for (const Obstacle &box : model.obstacles)
@@ -198,7 +238,8 @@ bool is_hidden_brute(const SiteModel &model, const Vector3d &eye, const Vector3d
     return false;
 }
 
-TEST(GroundMap, is_free_only_where_two_views_see_past_the_boxes) {
+TEST(GroundMap, is_free_only_where_two_views_see_past_the_boxes)
+{
     const SiteModel model = model_with_box();
     GroundMapOptions options;
     options.cell_m = 0.02;
@@ -226,7 +267,8 @@ TEST(GroundMap, is_free_only_where_two_views_see_past_the_boxes) {
     EXPECT_LE(n_differ, 3) << "steps of the brute force may miss a grazed edge";
 }
 
-TEST(GroundMap, holds_boxes_rings_suspects_and_stray_points) {
+TEST(GroundMap, holds_boxes_rings_suspects_and_stray_points)
+{
     SiteModel model = model_with_box();
     const std::vector<SitePoint> small = {at({0.3, 0.3, 0.05}), at({0.32, 0.3, 0.05})};
     model.suspected.push_back(fit_box(small, {0, 1}, 1));
@@ -247,7 +289,8 @@ TEST(GroundMap, holds_boxes_rings_suspects_and_stray_points) {
         }
 }
 
-TEST(GroundMap, without_views_knows_nothing_and_refuses_an_endless_map) {
+TEST(GroundMap, without_views_knows_nothing_and_refuses_an_endless_map)
+{
     SiteModel model;
     model.area = {0, 1, 0, 1, 1};
     EXPECT_EQ(cv::countNonZero(map_ground(model).codes), 0);
@@ -256,5 +299,5 @@ TEST(GroundMap, without_views_knows_nothing_and_refuses_an_endless_map) {
     EXPECT_THROW(map_ground(model, options), std::invalid_argument);
 }
 
-}  // namespace
-}  // namespace outcrop
+} // namespace
+} // namespace outcrop

@@ -25,13 +25,15 @@ constexpr unsigned kSeed = 62;
 // without neighbours.
 class Pyramid {
 public:
-    Pyramid(const std::vector<Vector3d> &points, double t_m) : points_(points), t_m_(t_m) {
+    Pyramid(const std::vector<Vector3d> &points, double t_m) : points_(points), t_m_(t_m)
+    {
         for (std::size_t i = 0; i < points.size(); ++i) cells_.push_back({static_cast<int>(i)});
         while (climb()) {
         }
     }
     // Roots as sets of points.
-    std::set<std::vector<int>> roots() const {
+    std::set<std::vector<int>> roots() const
+    {
         std::set<std::vector<int>> roots;
         for (std::vector<int> cell : cells_) {
             std::sort(cell.begin(), cell.end());
@@ -41,15 +43,18 @@ public:
     }
 
 private:
-    double distance(std::size_t a, std::size_t b) const {
+    double distance(std::size_t a, std::size_t b) const
+    {
         double least = std::numeric_limits<double>::infinity();
         for (const int i : cells_[a])
             for (const int j : cells_[b])
-                least = std::min(least, (points_[static_cast<std::size_t>(i)] - points_[static_cast<std::size_t>(j)]).norm());
+                least = std::min(least,
+                                 (points_[static_cast<std::size_t>(i)] - points_[static_cast<std::size_t>(j)]).norm());
         return least;
     }
     // One level up; false when every cell is a root.
-    bool climb() {
+    bool climb()
+    {
         const std::size_t n = cells_.size();
         std::vector<std::vector<std::size_t>> neighbours(n);
         bool has_edge = false;
@@ -60,9 +65,8 @@ private:
         // Survival by number of neighbours, then index, as the cell's own value; taken greedily, best first.
         std::vector<std::size_t> order(n);
         for (std::size_t i = 0; i < n; ++i) order[i] = i;
-        std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-            return neighbours[a].size() > neighbours[b].size();
-        });
+        std::stable_sort(order.begin(), order.end(),
+                         [&](std::size_t a, std::size_t b) { return neighbours[a].size() > neighbours[b].size(); });
         std::vector<char> survives(n, 0), is_covered(n, 0);
         for (const std::size_t i : order) {
             if (is_covered[i]) continue;
@@ -90,7 +94,8 @@ private:
     std::vector<std::vector<int>> cells_;
 };
 
-std::set<std::vector<int>> as_sets(const std::vector<int> &label) {
+std::set<std::vector<int>> as_sets(const std::vector<int> &label)
+{
     std::map<int, std::vector<int>> by_label;
     for (std::size_t i = 0; i < label.size(); ++i) by_label[label[i]].push_back(static_cast<int>(i));
     std::set<std::vector<int>> sets;
@@ -98,14 +103,16 @@ std::set<std::vector<int>> as_sets(const std::vector<int> &label) {
     return sets;
 }
 
-std::vector<Vector3d> random_points(int n, std::mt19937 *rng) {
+std::vector<Vector3d> random_points(int n, std::mt19937 *rng)
+{
     std::uniform_real_distribution<double> uniform(0, 1);
     std::vector<Vector3d> points;
     for (int i = 0; i < n; ++i) points.emplace_back(uniform(*rng), uniform(*rng), 0.3 * uniform(*rng));
     return points;
 }
 
-TEST(SingleLinkage, has_the_roots_of_the_irregular_pyramid) {
+TEST(SingleLinkage, has_the_roots_of_the_irregular_pyramid)
+{
     std::mt19937 rng(kSeed);
     for (const int n : {1, 2, 7, 40, 120})
         for (const double t_m : {0.0, 0.03, 0.08, 0.15, 0.4, 3.0}) {
@@ -115,7 +122,8 @@ TEST(SingleLinkage, has_the_roots_of_the_irregular_pyramid) {
         }
 }
 
-TEST(SingleLinkage, joins_at_the_threshold_and_not_beyond) {
+TEST(SingleLinkage, joins_at_the_threshold_and_not_beyond)
+{
     const std::vector<Vector3d> row = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3.0000001, 0, 0}};
     EXPECT_EQ(single_linkage(row, 1.0), (std::vector<int>{0, 0, 0, 1}));
     EXPECT_EQ(single_linkage(row, 0.5), (std::vector<int>{0, 1, 2, 3}));
@@ -124,7 +132,8 @@ TEST(SingleLinkage, joins_at_the_threshold_and_not_beyond) {
     EXPECT_THROW(single_linkage(row, std::nan("")), std::invalid_argument);
 }
 
-TEST(SpanningEdges, cut_at_t_m_leave_as_many_trees_as_there_are_clusters) {
+TEST(SpanningEdges, cut_at_t_m_leave_as_many_trees_as_there_are_clusters)
+{
     std::mt19937 rng(kSeed + 1);
     const std::vector<Vector3d> points = random_points(100, &rng);
     const std::vector<double> edges = spanning_edges(points);
@@ -136,7 +145,8 @@ TEST(SpanningEdges, cut_at_t_m_leave_as_many_trees_as_there_are_clusters) {
     }
 }
 
-TEST(AutomaticThreshold, falls_into_the_widest_gap_within_its_bounds) {
+TEST(AutomaticThreshold, falls_into_the_widest_gap_within_its_bounds)
+{
     EXPECT_NEAR(automatic_threshold({0.1, 0.11, 0.12, 0.5, 0.6}, 0.05, 1.0), std::sqrt(0.12 * 0.5), 1e-12);
     // No gap to speak of: the upper bound.
     EXPECT_EQ(automatic_threshold({0.1, 0.12, 0.14, 0.16, 0.18}, 0.09, 0.2), 0.2);
@@ -146,7 +156,8 @@ TEST(AutomaticThreshold, falls_into_the_widest_gap_within_its_bounds) {
     EXPECT_EQ(automatic_threshold({}, 0.05, 0.3), 0.3);
 }
 
-SitePoint at(double x, double y, double z) {
+SitePoint at(double x, double y, double z)
+{
     SitePoint point;
     point.position = Vector3d(x, y, z);
     point.covariance = 1e-6 * Eigen::Matrix3d::Identity();
@@ -154,14 +165,16 @@ SitePoint at(double x, double y, double z) {
 }
 
 // Corners every step along the edges of a box.
-void add_box(double x, double y, double w, double h, double step, std::vector<SitePoint> *points) {
+void add_box(double x, double y, double w, double h, double step, std::vector<SitePoint> *points)
+{
     for (double z = 0.05; z <= h; z += step)
         for (double t = 0; t <= w + 1e-9; t += step)
             for (const auto &[u, v] : {std::pair(t, 0.0), std::pair(t, w), std::pair(0.0, t), std::pair(w, t)})
                 points->push_back(at(x + u, y + v, z));
 }
 
-TEST(ClusterPoints, tells_objects_apart_and_sets_stragglers_aside) {
+TEST(ClusterPoints, tells_objects_apart_and_sets_stragglers_aside)
+{
     std::vector<SitePoint> points;
     add_box(-2, -2, 1.0, 0.8, 0.2, &points);
     add_box(1, 1, 0.6, 0.9, 0.15, &points);
@@ -179,7 +192,8 @@ TEST(ClusterPoints, tells_objects_apart_and_sets_stragglers_aside) {
     EXPECT_EQ(clusters.label[0], 0);
 }
 
-TEST(ClusterPoints, lets_height_count_less_unless_told_otherwise) {
+TEST(ClusterPoints, lets_height_count_less_unless_told_otherwise)
+{
     std::vector<SitePoint> points;
     for (int i = 0; i < 6; ++i) points.push_back(at(0.01 * i, 0, 0.1)), points.push_back(at(0.01 * i, 0, 0.9));
     ClusterOptions options;
@@ -189,7 +203,8 @@ TEST(ClusterPoints, lets_height_count_less_unless_told_otherwise) {
     EXPECT_EQ(cluster_points(points, 10, options).groups.size(), 2u);
 }
 
-TEST(ClusterPoints, reaches_farther_between_uncertain_points_when_asked) {
+TEST(ClusterPoints, reaches_farther_between_uncertain_points_when_asked)
+{
     std::vector<SitePoint> points;
     for (int i = 0; i < 5; ++i) points.push_back(at(0.01 * i, 0, 0.1));
     for (int i = 0; i < 5; ++i) points.push_back(at(0.40 + 0.01 * i, 0, 0.1));
@@ -201,12 +216,13 @@ TEST(ClusterPoints, reaches_farther_between_uncertain_points_when_asked) {
     EXPECT_EQ(cluster_points(points, 10, options).groups.size(), 1u);
 }
 
-TEST(ClusterPoints, takes_no_points_and_refuses_bad_options) {
+TEST(ClusterPoints, takes_no_points_and_refuses_bad_options)
+{
     EXPECT_TRUE(cluster_points({}, 10).groups.empty());
     ClusterOptions options;
     options.min_points = 0;
     EXPECT_THROW(cluster_points({}, 10, options), std::invalid_argument);
 }
 
-}  // namespace
-}  // namespace outcrop
+} // namespace
+} // namespace outcrop

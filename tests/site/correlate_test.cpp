@@ -144,7 +144,8 @@ TEST_F(CorrelateTest, TheWedgeIgnoresWhatLiesOutsideIt)
     const oc_junction_t &j = right_.junctions[0];
     const double a = j.branch[0].angle_rad;
     const double b = j.branch[1].angle_rad;
-    const Eigen::Vector2d away = -(Eigen::Vector2d(std::cos(a), std::sin(a)) + Eigen::Vector2d(std::cos(b), std::sin(b)));
+    const Eigen::Vector2d away =
+        -(Eigen::Vector2d(std::cos(a), std::sin(a)) + Eigen::Vector2d(std::cos(b), std::sin(b)));
     for (int y = 0; y < right_.grey.rows; y++) {
         for (int x = 0; x < right_.grey.cols; x++) {
             const Eigen::Vector2d offset(x - j.x_px, y - j.y_px);
@@ -219,5 +220,5 @@ TEST_F(CorrelateTest, RefusesBadOptionsAndPixelsOfAnotherSize)
     EXPECT_THROW(PreparedView(PosedView{}, CorrelateOptions{}), std::invalid_argument);
 }
 
-}  // namespace
-}  // namespace outcrop
+} // namespace
+} // namespace outcrop

@@ -15,7 +15,7 @@ namespace {
 
 struct Scene {
     std::vector<View> views;
-    std::vector<std::vector<int>> corner_of;  // of each view's junctions
+    std::vector<std::vector<int>> corner_of; // of each view's junctions
 };
 
 // Views at these azimuths, with the junctions of all corners they see.
@@ -51,6 +51,12 @@ PairResult match_views(const Scene &s, int left, int right, const MatchOptions &
     return match_pair(l, r, scene::area(), options);
 }
 
+// Of the first two views.
+std::vector<Match> matches_of(const Scene &s, const MatchOptions &options = {})
+{
+    return match_views(s, 0, 1, options).pair.matches;
+}
+
 int common_corners(const Scene &s, int left, int right)
 {
     int n = 0;
@@ -84,8 +90,8 @@ TEST(MatchPair, PointsAndKindsAreTheScenes)
 {
     const Scene s = scene_of({25, 55});
     int n_ground = 0;
-    for (const Match &match : match_views(s, 0, 1).pair.matches) {
-        const scene::Corner &corner = scene::corners()[s.corner_of[0][match.left_junction]];
+    for (const Match &match : matches_of(s)) {
+        const scene::Corner corner = scene::corners()[s.corner_of[0][match.left_junction]];
         EXPECT_LT((match.point - corner.point).norm(), 1e-4);
         EXPECT_EQ(match.kind == MatchKind::kGround, corner.face == 6) << match.point.transpose();
         n_ground += match.kind == MatchKind::kGround ? 1 : 0;
@@ -111,7 +117,7 @@ TEST(MatchPair, CovarianceIsThatOfNoisyPixels)
                 j.y_px += noise(rng);
             }
         }
-        for (const Match &match : match_views(s, 0, 1, options).pair.matches) {
+        for (const Match &match : matches_of(s, options)) {
             if (!is_true(s, 0, 1, match)) continue;
             const Eigen::Vector3d off = match.point - scene::corners()[s.corner_of[0][match.left_junction]].point;
             sum += off.dot(match.covariance.ldlt().solve(off));
@@ -163,7 +169,7 @@ TEST(MatchPair, ATwinCornerMakesAMatchAmbiguous)
         right.junctions.push_back(twin);
         s.corner_of[1].push_back(-1);
     }
-    for (const Match &after : match_views(s, 0, 1).pair.matches) EXPECT_NE(after.left_junction, match.left_junction);
+    for (const Match &after : matches_of(s)) EXPECT_NE(after.left_junction, match.left_junction);
 }
 
 TEST(MatchPair, IsAFunctionOfItsInput)
@@ -190,7 +196,7 @@ TEST(MatchPair, TheThesisMethodMatchesTheSceneToo)
 {
     Scene s = scene_of({25, 50});
     for (View &view : s.views) {
-        for (int i = 0; i < 6; i++) view.margin.v[i] = 0.005;  // its strip has no width without
+        for (int i = 0; i < 6; i++) view.margin.v[i] = 0.005; // its strip has no width without
     }
     const PairResult result = match_views(s, 0, 1, thesis_match_options());
     int n_true = 0;
@@ -317,5 +323,5 @@ TEST_F(PairErrorsTest, MatchesShrinkTheStripRoundTheTruth)
     }
 }
 
-}  // namespace
-}  // namespace outcrop
+} // namespace
+} // namespace outcrop

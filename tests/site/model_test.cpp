@@ -28,7 +28,8 @@ struct Block {
 // As far apart as the thesis' two obstacles.
 const std::vector<Block> kBlocks = {{{-0.02, -0.19, 0}, {0.17, -0.05, 0.19}}, {{0.2, 0.25, 0}, {0.36, 0.39, 0.11}}};
 
-std::vector<Corner> blocks_on_ground(std::mt19937 *rng) {
+std::vector<Corner> blocks_on_ground(std::mt19937 *rng)
+{
     std::vector<Corner> corners = random_corners(60, 0, rng);
     std::uniform_real_distribution<double> uniform(0, 1);
     for (std::size_t b = 0; b < kBlocks.size(); ++b) {
@@ -49,7 +50,8 @@ struct Site {
     std::vector<PairMatches> matches;
 };
 
-Site make_site(unsigned seed, const oc_margin_t &margin, double wrong_share) {
+Site make_site(unsigned seed, const oc_margin_t &margin, double wrong_share)
+{
     std::mt19937 rng(seed);
     Site site;
     site.scene = make_scene(blocks_on_ground(&rng), margin, 0.4, &rng);
@@ -57,11 +59,14 @@ Site make_site(unsigned seed, const oc_margin_t &margin, double wrong_share) {
     return site;
 }
 
-SiteModel build(const Site &site, const BuildOptions &options = {}) {
-    return build_from_matches(site.scene.views, kArea, [&](const MatchPass &) { return site.matches; }, options);
+SiteModel build(const Site &site, const BuildOptions &options = {})
+{
+    return build_from_matches(
+        site.scene.views, kArea, [&](const MatchPass &) { return site.matches; }, options);
 }
 
-void expect_blocks(const SiteModel &model, double least_iou) {
+void expect_blocks(const SiteModel &model, double least_iou)
+{
     ASSERT_EQ(model.obstacles.size(), kBlocks.size());
     for (const Block &block : kBlocks) {
         double best = 0;
@@ -71,7 +76,8 @@ void expect_blocks(const SiteModel &model, double least_iou) {
     }
 }
 
-bool same_bits(const SiteModel &a, const SiteModel &b) {
+bool same_bits(const SiteModel &a, const SiteModel &b)
+{
     if (a.views.size() != b.views.size() || a.points.size() != b.points.size() ||
         a.obstacles.size() != b.obstacles.size() || a.pairs.size() != b.pairs.size() || a.counts != b.counts)
         return false;
@@ -89,7 +95,8 @@ bool same_bits(const SiteModel &a, const SiteModel &b) {
     return true;
 }
 
-TEST(BuildSite, boxes_both_blocks_with_exact_poses) {
+TEST(BuildSite, boxes_both_blocks_with_exact_poses)
+{
     const SiteModel model = build(make_site(kSeed, margin_of(0, 0), 0));
     expect_blocks(model, 0.8);
     EXPECT_TRUE(model.suspected.empty());
@@ -97,7 +104,8 @@ TEST(BuildSite, boxes_both_blocks_with_exact_poses) {
     for (const SitePoint &p : model.points) EXPECT_GE(p.position.z(), 0.004);
 }
 
-TEST(BuildSite, boxes_both_blocks_with_poses_that_fill_their_margins) {
+TEST(BuildSite, boxes_both_blocks_with_poses_that_fill_their_margins)
+{
     for (unsigned seed = kSeed; seed < kSeed + 3; ++seed) {
         const SiteModel model = build(make_site(seed, kMargin, 0.1));
         expect_blocks(model, 0.6);
@@ -105,7 +113,8 @@ TEST(BuildSite, boxes_both_blocks_with_poses_that_fill_their_margins) {
     }
 }
 
-TEST(BuildSite, does_not_depend_on_the_order_of_views_and_matches) {
+TEST(BuildSite, does_not_depend_on_the_order_of_views_and_matches)
+{
     const Site site = make_site(kSeed, kMargin, 0.1);
     const SiteModel model = build(site);
     EXPECT_TRUE(same_bits(model, build(site)));
@@ -116,7 +125,8 @@ TEST(BuildSite, does_not_depend_on_the_order_of_views_and_matches) {
     EXPECT_FALSE(same_bits(model, build(make_site(kSeed + 1, kMargin, 0.1))));
 }
 
-TEST(BuildSite, gives_the_second_pass_better_poses_and_narrower_margins) {
+TEST(BuildSite, gives_the_second_pass_better_poses_and_narrower_margins)
+{
     const Site site = make_site(kSeed, kMargin, 0);
     std::vector<MatchPass> passes;
     build_from_matches(site.scene.views, kArea, [&](const MatchPass &pass) {
@@ -140,12 +150,14 @@ TEST(BuildSite, gives_the_second_pass_better_poses_and_narrower_margins) {
     EXPECT_EQ(n_passes, 1u) << "exact poses need no second pass";
 }
 
-TEST(BuildSite, keeps_only_matches_that_tracks_hold) {
+TEST(BuildSite, keeps_only_matches_that_tracks_hold)
+{
     const Site site = make_site(kSeed, margin_of(0, 0), 0.2);
     const SiteModel model = build(site);
     std::size_t n = 0, n_wrong = 0;
     for (const PairMatches &pair : model.pairs) {
-        const std::size_t left = static_cast<std::size_t>(pair.left - 10) / 3, right = static_cast<std::size_t>(pair.right - 10) / 3;
+        const std::size_t left = static_cast<std::size_t>(pair.left - 10) / 3;
+        const std::size_t right = static_cast<std::size_t>(pair.right - 10) / 3;
         for (const Match &match : pair.matches) {
             ++n;
             n_wrong += site.scene.shown[left][static_cast<std::size_t>(match.left_junction)] !=
@@ -156,7 +168,8 @@ TEST(BuildSite, keeps_only_matches_that_tracks_hold) {
     EXPECT_LT(static_cast<double>(n_wrong), 0.03 * static_cast<double>(n));
 }
 
-TEST(BuildSite, answers_nothing_to_nothing_and_refuses_nonsense) {
+TEST(BuildSite, answers_nothing_to_nothing_and_refuses_nonsense)
+{
     const Matcher none = [](const MatchPass &) { return std::vector<PairMatches>(); };
     EXPECT_TRUE(build_from_matches({}, std::nullopt, none).views.empty());
     Site site = make_site(kSeed, kMargin, 0);
@@ -175,7 +188,8 @@ TEST(BuildSite, answers_nothing_to_nothing_and_refuses_nonsense) {
     EXPECT_THROW(build_from_matches(site.scene.views, Area{1, 0, 0, 1, 1}, none), std::invalid_argument);
 }
 
-TEST(DeriveArea, covers_what_two_views_share_and_no_more_than_a_sane_reach) {
+TEST(DeriveArea, covers_what_two_views_share_and_no_more_than_a_sane_reach)
+{
     const Scene scene = make_site(kSeed, margin_of(0, 0), 0).scene;
     const Area area = derive_area(scene.views);
     for (const Block &block : kBlocks) {
@@ -191,5 +205,5 @@ TEST(DeriveArea, covers_what_two_views_share_and_no_more_than_a_sane_reach) {
     EXPECT_NEAR(apart.x_max - apart.x_min, 2 * 0.761427, 1e-6);
 }
 
-}  // namespace
-}  // namespace outcrop
+} // namespace
+} // namespace outcrop

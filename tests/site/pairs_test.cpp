@@ -59,7 +59,8 @@ TEST(SelectPairs, ParallaxIsTheAngleBetweenTheRays)
     for (int i = 0; i < 2; i++) {
         const double a = i * 0.3;
         views[i].id = i;
-        views[i].camera = scene::look_at(Eigen::Vector3d(50 * std::cos(a), 50 * std::sin(a), 30), Eigen::Vector3d::Zero());
+        views[i].camera =
+            scene::look_at(Eigen::Vector3d(50 * std::cos(a), 50 * std::sin(a), 30), Eigen::Vector3d::Zero());
     }
     const Eigen::Vector3d c0 = Eigen::Vector3d(50, 0, 30).normalized();
     const Eigen::Vector3d c1 = Eigen::Vector3d(50 * std::cos(0.3), 50 * std::sin(0.3), 30).normalized();
@@ -186,7 +187,8 @@ TEST(FindCandidates, TheBucketIndexFindsWhatBruteForceFinds)
             const oc_junction_t &r = two.right.junctions[j];
             if (!oc_strip_contains(&strip, r.x_px, r.y_px) || !oc_segment_contains(&segment, r.x_px, r.y_px)) continue;
             oc_midpoint_t m;
-            if (oc_epipolar_midpoint(&two.left.camera, l.x_px, l.y_px, &two.right.camera, r.x_px, r.y_px, &m) != OC_OK) continue;
+            if (oc_epipolar_midpoint(&two.left.camera, l.x_px, l.y_px, &two.right.camera, r.x_px, r.y_px, &m) != OC_OK)
+                continue;
             if (!(m.depth_left_m > 0 && m.depth_right_m > 0)) continue;
             n_brute++;
             EXPECT_EQ(found.count({static_cast<int>(i), static_cast<int>(j)}), 1u) << i << " " << j;
@@ -246,7 +248,8 @@ TEST(PreparePair, RefusesBadMarginsAndSaysWhenThereIsNoGeometry)
     oc_pair_t pair;
     EXPECT_FALSE(prepare_pair(as_reported(two.left), as_reported(two.left), StripOptions{}, &pair));
     two.left.margin.v[0] = -1;
-    EXPECT_THROW(prepare_pair(as_reported(two.left), as_reported(two.right), StripOptions{}, &pair), std::invalid_argument);
+    EXPECT_THROW(prepare_pair(as_reported(two.left), as_reported(two.right), StripOptions{}, &pair),
+                 std::invalid_argument);
 }
 
 // ---- blocks ----
@@ -314,5 +317,5 @@ TEST(WantedBlocks, RefusesTablesOfTheWrongSize)
     EXPECT_THROW(wanted_blocks(views, {}, scene::area(), {}, options), std::invalid_argument);
 }
 
-}  // namespace
-}  // namespace outcrop
+} // namespace
+} // namespace outcrop

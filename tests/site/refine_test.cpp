@@ -33,7 +33,8 @@ struct Solved {
     RefineResult result;
 };
 
-Solved run(unsigned seed, double wrong_share, const oc_margin_t &margin, const RefineOptions &options = {}) {
+Solved run(unsigned seed, double wrong_share, const oc_margin_t &margin, const RefineOptions &options = {})
+{
     std::mt19937 rng(seed);
     Solved r;
     r.scene = make_scene(random_corners(60, 60, &rng), margin, kNoisePx, &rng);
@@ -50,7 +51,8 @@ Solved run(unsigned seed, double wrong_share, const oc_margin_t &margin, const R
 }
 
 // RMSE of the obstacle corners triangulated from all views that show them.
-double obstacle_rmse_m(const Scene &scene, const std::vector<oc_camera_t> &cameras) {
+double obstacle_rmse_m(const Scene &scene, const std::vector<oc_camera_t> &cameras)
+{
     double sum = 0;
     int n = 0;
     for (std::size_t c = 0; c < scene.corners.size(); ++c) {
@@ -59,8 +61,8 @@ double obstacle_rmse_m(const Scene &scene, const std::vector<oc_camera_t> &camer
         for (std::size_t v = 0; v < scene.views.size(); ++v)
             for (std::size_t k = 0; k < scene.shown[v].size(); ++k)
                 if (scene.shown[v][k] == static_cast<int>(c))
-                    sightings.push_back({&cameras[v], scene.views[v].junctions[k].x_px,
-                                         scene.views[v].junctions[k].y_px, nullptr});
+                    sightings.push_back(
+                        {&cameras[v], scene.views[v].junctions[k].x_px, scene.views[v].junctions[k].y_px, nullptr});
         const auto point = triangulate(sightings);
         if (!point) continue;
         sum += (point->point - scene.corners[c].position).squaredNorm();
@@ -70,7 +72,8 @@ double obstacle_rmse_m(const Scene &scene, const std::vector<oc_camera_t> &camer
 }
 
 // RMS error of carrying true ground pixels from each view into the next.
-double ground_transfer_px(const Scene &scene, const std::vector<oc_camera_t> &cameras) {
+double ground_transfer_px(const Scene &scene, const std::vector<oc_camera_t> &cameras)
+{
     double sum = 0;
     int n = 0;
     for (std::size_t v = 0; v < cameras.size(); ++v) {
@@ -91,13 +94,15 @@ double ground_transfer_px(const Scene &scene, const std::vector<oc_camera_t> &ca
     return std::sqrt(sum / n);
 }
 
-std::vector<oc_camera_t> cameras_of(const RefineResult &result) {
+std::vector<oc_camera_t> cameras_of(const RefineResult &result)
+{
     std::vector<oc_camera_t> cameras;
     for (const RefinedView &view : result.views) cameras.push_back(view.camera);
     return cameras;
 }
 
-std::vector<oc_camera_t> sensor_cameras(const Scene &scene) {
+std::vector<oc_camera_t> sensor_cameras(const Scene &scene)
+{
     std::vector<oc_camera_t> cameras;
     for (const View &view : scene.views) cameras.push_back(view.camera);
     return cameras;
@@ -106,7 +111,8 @@ std::vector<oc_camera_t> sensor_cameras(const Scene &scene) {
 class RefineAccuracy : public ::testing::TestWithParam<double> {};
 
 // The errors of single sites differ mostly by what moves all cameras alike, so the limits hold on the mean of five.
-TEST_P(RefineAccuracy, is_a_few_millimetres_and_half_a_pixel) {
+TEST_P(RefineAccuracy, is_a_few_millimetres_and_half_a_pixel)
+{
     double rmse = 0, rmse_before = 0, transfer = 0;
     constexpr int kSites = 5;
     for (int i = 0; i < kSites; ++i) {
@@ -127,7 +133,8 @@ TEST_P(RefineAccuracy, is_a_few_millimetres_and_half_a_pixel) {
 
 INSTANTIATE_TEST_SUITE_P(WrongShare, RefineAccuracy, ::testing::Values(0.0, 0.2));
 
-TEST(Refine, says_how_uncertain_it_is) {
+TEST(Refine, says_how_uncertain_it_is)
+{
     // Squared errors of all poses over their predicted variances: 1 on average, the margins' own share included.
     double sum = 0;
     int n = 0;
@@ -152,7 +159,8 @@ TEST(Refine, says_how_uncertain_it_is) {
     EXPECT_LT(ratio, 1.4);
 }
 
-TEST(Refine, knows_views_better_against_each_other_than_in_the_world) {
+TEST(Refine, knows_views_better_against_each_other_than_in_the_world)
+{
     const Solved r = run(kSeed, 0, kMargin);
     for (std::size_t v = 0; v < r.scene.views.size(); ++v) {
         EXPECT_LT(r.result.relative_covariances[v].trace(), r.result.pose_covariances[v].trace());
@@ -160,7 +168,8 @@ TEST(Refine, knows_views_better_against_each_other_than_in_the_world) {
     }
 }
 
-TEST(Refine, leaves_exact_poses_alone) {
+TEST(Refine, leaves_exact_poses_alone)
+{
     const Solved r = run(kSeed, 0, margin_of(0, 0));
     for (std::size_t v = 0; v < r.scene.views.size(); ++v) {
         EXPECT_EQ(std::memcmp(&r.result.views[v].camera, &r.scene.views[v].camera, sizeof(oc_camera_t)), 0);
@@ -169,7 +178,8 @@ TEST(Refine, leaves_exact_poses_alone) {
     }
 }
 
-TEST(Refine, holds_the_exact_view_among_others) {
+TEST(Refine, holds_the_exact_view_among_others)
+{
     std::mt19937 rng(kSeed);
     Scene scene = make_scene(random_corners(60, 60, &rng), kMargin, kNoisePx, &rng);
     scene.views[2].camera = scene.truth[2];
@@ -180,7 +190,8 @@ TEST(Refine, holds_the_exact_view_among_others) {
     EXPECT_LT((camera_centre(result.views[3].camera) - camera_centre(scene.truth[3])).norm(), 0.006);
 }
 
-TEST(Refine, keeps_the_sensor_where_nothing_is_seen) {
+TEST(Refine, keeps_the_sensor_where_nothing_is_seen)
+{
     std::mt19937 rng(kSeed);
     Scene scene = make_scene(random_corners(60, 60, &rng), kMargin, kNoisePx, &rng);
     scene.views[5].junctions.clear();
@@ -195,7 +206,8 @@ TEST(Refine, keeps_the_sensor_where_nothing_is_seen) {
     for (const RefinedView &view : nothing.views) EXPECT_FALSE(view.is_improved);
 }
 
-TEST(Refine, ties_of_the_ground_alone_settle_the_ground) {
+TEST(Refine, ties_of_the_ground_alone_settle_the_ground)
+{
     std::mt19937 rng(kSeed);
     Scene scene = make_scene(random_corners(60, 0, &rng), kMargin, 0.3, &rng);
     // Each view is tied to the one before it; a shared position makes chains of them.
@@ -204,11 +216,11 @@ TEST(Refine, ties_of_the_ground_alone_settle_the_ground) {
             for (std::size_t m = 0; m < scene.shown[v - 1].size(); ++m) {
                 if (scene.shown[v][k] != scene.shown[v - 1][m]) continue;
                 const oc_junction_t &own = scene.views[v].junctions[k], &ref = scene.views[v - 1].junctions[m];
-                scene.views[v].ties.push_back({static_cast<std::uint16_t>(scene.views[v - 1].id), own.x_px, own.y_px,
-                                               ref.x_px + 0.2f, ref.y_px});
+                scene.views[v].ties.push_back(
+                    {static_cast<std::uint16_t>(scene.views[v - 1].id), own.x_px, own.y_px, ref.x_px + 0.2f, ref.y_px});
             }
         }
-        scene.views[v].ties.push_back({9999, 1, 1, 2, 2});  // to a view that is not there
+        scene.views[v].ties.push_back({9999, 1, 1, 2, 2}); // to a view that is not there
     }
     const RefineResult result = refine_poses(scene.views, {});
     EXPECT_GE(result.n_ground, 40);
@@ -218,7 +230,8 @@ TEST(Refine, ties_of_the_ground_alone_settle_the_ground) {
     EXPECT_GT(ground_transfer_px(scene, sensor_cameras(scene)), 3);
 }
 
-TEST(Refine, gives_the_same_bits_twice) {
+TEST(Refine, gives_the_same_bits_twice)
+{
     const Solved a = run(kSeed, 0.2, kMargin), b = run(kSeed, 0.2, kMargin);
     for (std::size_t v = 0; v < a.result.views.size(); ++v) {
         EXPECT_EQ(std::memcmp(&a.result.views[v].camera, &b.result.views[v].camera, sizeof(oc_camera_t)), 0);
@@ -226,7 +239,8 @@ TEST(Refine, gives_the_same_bits_twice) {
     }
 }
 
-TEST(Refine, refuses_options_that_make_no_sense) {
+TEST(Refine, refuses_options_that_make_no_sense)
+{
     RefineOptions options;
     options.sigma_px = std::nan("");
     EXPECT_THROW(refine_poses({}, {}, options), std::invalid_argument);
@@ -235,7 +249,8 @@ TEST(Refine, refuses_options_that_make_no_sense) {
 
 // Tracks ------------------------------------------------------------------------------------------------------------
 
-TEST(Tracks, do_not_depend_on_the_order_of_pairs_and_hold_one_junction_per_view) {
+TEST(Tracks, do_not_depend_on_the_order_of_pairs_and_hold_one_junction_per_view)
+{
     std::mt19937 rng(kSeed);
     const Scene scene = make_scene(random_corners(60, 60, &rng), kMargin, kNoisePx, &rng);
     std::vector<PairMatches> pairs = make_matches(scene, 0.2, 60, &rng);
@@ -252,7 +267,8 @@ TEST(Tracks, do_not_depend_on_the_order_of_pairs_and_hold_one_junction_per_view)
     }
 }
 
-TEST(Tracks, settled_with_the_true_poses_keep_the_corners_and_drop_wrong_sightings) {
+TEST(Tracks, settled_with_the_true_poses_keep_the_corners_and_drop_wrong_sightings)
+{
     std::mt19937 rng(kSeed);
     const Scene scene = make_scene(random_corners(60, 60, &rng), kMargin, 0.3, &rng);
     const std::vector<Track> merged = merge_tracks(scene.views, make_matches(scene, 0.2, 60, &rng));
@@ -278,5 +294,5 @@ TEST(Tracks, settled_with_the_true_poses_keep_the_corners_and_drop_wrong_sightin
     EXPECT_GE(std::count(is_found.begin(), is_found.end(), 1), 110);
 }
 
-}  // namespace
-}  // namespace outcrop
+} // namespace
+} // namespace outcrop

@@ -28,7 +28,8 @@ inline constexpr double kTable73[8][6] = {{-386.8721, 91.3538, 761.427, 2.5962, 
                                           {170.9942, 657.6221, 752.5581, -31.5844, -7.1256, -165.1466},
                                           {-220.2339, 531.4125, 755.2014, -21.567, -22.6891, -130.9459}};
 
-inline oc_camera_t thesis_camera(int index) {
+inline oc_camera_t thesis_camera(int index)
+{
     const double *row = kTable73[index];
     oc_camera_t camera{};
     camera.k = oc_intrinsics_from_format(3.6, 3.5311, 2.7446, 640, 480);
@@ -39,7 +40,8 @@ inline oc_camera_t thesis_camera(int index) {
 }
 
 // Moves every parameter by a uniform error of at most the margin.
-inline oc_camera_t disturbed(const oc_camera_t &camera, const oc_margin_t &margin, std::mt19937 *rng) {
+inline oc_camera_t disturbed(const oc_camera_t &camera, const oc_margin_t &margin, std::mt19937 *rng)
+{
     std::uniform_real_distribution<double> uniform(-1, 1);
     oc_pose6_t six;
     oc_pose_to_6(&camera.pose, &six);
@@ -49,7 +51,8 @@ inline oc_camera_t disturbed(const oc_camera_t &camera, const oc_margin_t &margi
     return result;
 }
 
-inline oc_margin_t margin_of(double position_m, double angle_rad) {
+inline oc_margin_t margin_of(double position_m, double angle_rad)
+{
     return {{position_m, position_m, position_m, angle_rad, angle_rad, angle_rad}};
 }
 
@@ -62,13 +65,14 @@ struct Corner {
 struct Scene {
     std::vector<oc_camera_t> truth;
     std::vector<Corner> corners;
-    std::vector<View> views;                   // junction k of a view is the corner shown[view][k]
+    std::vector<View> views; // junction k of a view is the corner shown[view][k]
     std::vector<std::vector<int>> shown;
 };
 
 // Views with disturbed poses and noisy junctions; each is shown only where it falls into the image.
 inline Scene make_scene(const std::vector<Corner> &corners, const oc_margin_t &margin, double noise_px,
-                        std::mt19937 *rng) {
+                        std::mt19937 *rng)
+{
     std::normal_distribution<double> noise(0, noise_px > 0 ? noise_px : 1);
     Scene scene;
     scene.corners = corners;
@@ -96,15 +100,16 @@ inline Scene make_scene(const std::vector<Corner> &corners, const oc_margin_t &m
 
 // Matches of neighbouring views (one and two steps round the circle); a share of them is wrong: the right junction of
 // another corner, not farther than reach_px.
-inline std::vector<PairMatches> make_matches(const Scene &scene, double wrong_share, double reach_px,
-                                             std::mt19937 *rng) {
+inline std::vector<PairMatches> make_matches(const Scene &scene, double wrong_share, double reach_px, std::mt19937 *rng)
+{
     std::uniform_real_distribution<double> uniform(0, 1);
     std::vector<PairMatches> pairs;
     const int n = static_cast<int>(scene.views.size());
     for (int step = 1; step <= 2; ++step) {
         for (int a = 0; a < n; ++a) {
             const int left = std::min(a, (a + step) % n), right = std::max(a, (a + step) % n);
-            const auto &l = scene.shown[static_cast<std::size_t>(left)], &r = scene.shown[static_cast<std::size_t>(right)];
+            const auto &l = scene.shown[static_cast<std::size_t>(left)];
+            const auto &r = scene.shown[static_cast<std::size_t>(right)];
             PairMatches pair;
             pair.left = scene.views[static_cast<std::size_t>(left)].id;
             pair.right = scene.views[static_cast<std::size_t>(right)].id;
@@ -114,8 +119,8 @@ inline std::vector<PairMatches> make_matches(const Scene &scene, double wrong_sh
                 Match match;
                 match.left_junction = static_cast<int>(i);
                 match.right_junction = static_cast<int>(found - r.begin());
-                match.kind = scene.corners[static_cast<std::size_t>(l[i])].is_ground ? MatchKind::kGround
-                                                                                     : MatchKind::kObstacle;
+                match.kind =
+                    scene.corners[static_cast<std::size_t>(l[i])].is_ground ? MatchKind::kGround : MatchKind::kObstacle;
                 match.score = 0.8 + 0.2 * uniform(*rng);
                 if (uniform(*rng) < wrong_share) {
                     const auto &junctions = scene.views[static_cast<std::size_t>(right)].junctions;
@@ -126,8 +131,8 @@ inline std::vector<PairMatches> make_matches(const Scene &scene, double wrong_sh
                             std::hypot(static_cast<double>(junctions[k].x_px - good.x_px),
                                        static_cast<double>(junctions[k].y_px - good.y_px)) < reach_px)
                             near.push_back(static_cast<int>(k));
-                    if (!near.empty())
-                        match.right_junction = near[static_cast<std::size_t>(uniform(*rng) * 0.999999 * static_cast<double>(near.size()))];
+                    const double pick = uniform(*rng) * 0.999999 * static_cast<double>(near.size());
+                    if (!near.empty()) match.right_junction = near[static_cast<std::size_t>(pick)];
                 }
                 pair.matches.push_back(match);
             }
@@ -137,7 +142,8 @@ inline std::vector<PairMatches> make_matches(const Scene &scene, double wrong_sh
     return pairs;
 }
 
-inline std::vector<Corner> random_corners(int n_ground, int n_obstacle, std::mt19937 *rng) {
+inline std::vector<Corner> random_corners(int n_ground, int n_obstacle, std::mt19937 *rng)
+{
     std::uniform_real_distribution<double> uniform(0, 1);
     std::vector<Corner> corners;
     for (int i = 0; i < n_ground; ++i)
@@ -148,4 +154,4 @@ inline std::vector<Corner> random_corners(int n_ground, int n_obstacle, std::mt1
     return corners;
 }
 
-}  // namespace outcrop::synthetic
+} // namespace outcrop::synthetic

@@ -49,7 +49,8 @@ inline oc_camera_t on_ring(double azimuth_deg, double radius_m = 1.6)
 
 inline double lattice(int ix, int iy, int seed)
 {
-    auto h = static_cast<std::uint32_t>(ix * 374761393 + iy * 668265263 + seed * 974634233);
+    const auto u = [](int i) { return static_cast<std::uint32_t>(i); };
+    std::uint32_t h = u(ix) * 374761393U + u(iy) * 668265263U + u(seed) * 974634233U;
     h = (h ^ (h >> 13)) * 1274126177U;
     return static_cast<double>((h ^ (h >> 16)) & 0xffffU) / 65535.0;
 }
@@ -72,7 +73,7 @@ inline double noise(double u, double v, int seed)
 
 struct Hit {
     double distance = std::numeric_limits<double>::infinity();
-    int face = -1;  // 0..5: x min, x max, y min, ..., z max; 6: ground
+    int face = -1; // 0..5: x min, x max, y min, ..., z max; 6: ground
     Eigen::Vector3d point = Eigen::Vector3d::Zero();
 };
 
@@ -182,7 +183,8 @@ inline std::vector<Corner> corners()
     for (int i = 0; i < 4; i++) {
         for (int j = 0; j < 3; j++) {
             const double turn = 0.4 * (i + 3 * j);
-            const auto add = [&](const Eigen::Vector3d &at, const Eigen::Vector3d &a, const Eigen::Vector3d &b, int face) {
+            const auto add = [&](const Eigen::Vector3d &at, const Eigen::Vector3d &a, const Eigen::Vector3d &b,
+                                 int face) {
                 const Eigen::Vector3d u = std::cos(turn) * a + std::sin(turn) * b;
                 const Eigen::Vector3d v = std::cos(turn + 1.3) * a + std::sin(turn + 1.3) * b;
                 all.push_back(Corner{at, u, v, face});
@@ -221,5 +223,5 @@ inline oc_camera_t moved(const oc_camera_t &camera, const double by[6])
     return result;
 }
 
-}  // namespace scene
-}  // namespace outcrop
+} // namespace scene
+} // namespace outcrop

@@ -21,14 +21,16 @@ using synthetic::thesis_camera;
 
 constexpr unsigned kSeed = 20040617;
 
-Vector2d pixel_of(const oc_camera_t &camera, const Vector3d &point) {
+Vector2d pixel_of(const oc_camera_t &camera, const Vector3d &point)
+{
     double x = 0, y = 0;
     EXPECT_GT(oc_camera_project(&camera, point.data(), &x, &y), 0);
     return {x, y};
 }
 
 // The camera moved by a centre offset and a local rotation vector.
-oc_camera_t moved(const oc_camera_t &camera, const Eigen::Matrix<double, 6, 1> &by) {
+oc_camera_t moved(const oc_camera_t &camera, const Eigen::Matrix<double, 6, 1> &by)
+{
     const Vector3d turn = by.tail<3>();
     Eigen::Matrix3d rotation = camera_rotation(camera);
     if (turn.norm() > 0) rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix() * rotation;
@@ -39,7 +41,8 @@ oc_camera_t moved(const oc_camera_t &camera, const Eigen::Matrix<double, 6, 1> &
     return result;
 }
 
-TEST(Triangulate, finds_the_point_of_two_and_of_eight_exact_rays) {
+TEST(Triangulate, finds_the_point_of_two_and_of_eight_exact_rays)
+{
     std::vector<oc_camera_t> cameras;
     for (int i = 0; i < 8; ++i) cameras.push_back(thesis_camera(i));
     const Vector3d point(0.11, 0.07, 0.09);
@@ -56,7 +59,8 @@ TEST(Triangulate, finds_the_point_of_two_and_of_eight_exact_rays) {
     }
 }
 
-TEST(Triangulate, without_iterations_is_the_midpoint_of_the_thesis) {
+TEST(Triangulate, without_iterations_is_the_midpoint_of_the_thesis)
+{
     const oc_camera_t a = thesis_camera(5), b = thesis_camera(6);
     const Vector2d p = pixel_of(a, {0.1, 0.1, 0.05}) + Vector2d(0.8, -0.5), q = pixel_of(b, {0.1, 0.1, 0.05});
     oc_midpoint_t expected;
@@ -69,7 +73,8 @@ TEST(Triangulate, without_iterations_is_the_midpoint_of_the_thesis) {
     EXPECT_NEAR(result->parallax_rad, expected.parallax_rad, 1e-9);
 }
 
-TEST(Triangulate, derivatives_agree_with_differences) {
+TEST(Triangulate, derivatives_agree_with_differences)
+{
     const oc_camera_t camera = thesis_camera(3);
     const Vector3d point(0.2, 0.15, 0.1);
     Vector2d pixel;
@@ -92,7 +97,8 @@ TEST(Triangulate, derivatives_agree_with_differences) {
     }
 }
 
-TEST(Triangulate, angles_of_the_thesis_turn_as_their_rotation_vectors_say) {
+TEST(Triangulate, angles_of_the_thesis_turn_as_their_rotation_vectors_say)
+{
     for (int i = 0; i < 8; ++i) {
         const oc_camera_t camera = thesis_camera(i);
         const Eigen::Matrix3d turn = rotation_by_opk(camera);
@@ -110,7 +116,8 @@ TEST(Triangulate, angles_of_the_thesis_turn_as_their_rotation_vectors_say) {
     }
 }
 
-TEST(Triangulate, covariance_is_what_noise_of_pixels_and_poses_scatters) {
+TEST(Triangulate, covariance_is_what_noise_of_pixels_and_poses_scatters)
+{
     std::mt19937 rng(kSeed);
     std::normal_distribution<double> normal;
     const Vector3d point(0.12, 0.2, 0.06);
@@ -138,7 +145,8 @@ TEST(Triangulate, covariance_is_what_noise_of_pixels_and_poses_scatters) {
         EXPECT_NEAR(std::sqrt(scatter(k, k) / predicted(k, k)), 1, 0.06) << "axis " << k << " seed " << kSeed;
 }
 
-TEST(Triangulate, gives_nothing_for_parallel_rays_one_ray_or_a_point_behind) {
+TEST(Triangulate, gives_nothing_for_parallel_rays_one_ray_or_a_point_behind)
+{
     const oc_camera_t a = thesis_camera(0), b = thesis_camera(4);
     EXPECT_FALSE(triangulate({}).has_value());
     EXPECT_FALSE(triangulate({{&a, 320, 240, nullptr}}).has_value());
@@ -156,5 +164,5 @@ TEST(Triangulate, gives_nothing_for_parallel_rays_one_ray_or_a_point_behind) {
         triangulate({{&back_a, 640 - p.x(), p.y(), nullptr}, {&back_b, 640 - q.x(), q.y(), nullptr}}).has_value());
 }
 
-}  // namespace
-}  // namespace outcrop
+} // namespace
+} // namespace outcrop

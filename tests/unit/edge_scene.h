@@ -21,12 +21,12 @@ typedef double (*edge_level_t)(const void *scene, double x_px, double y_px);
 /* Sectors of constant grey around one point. */
 typedef struct edge_fan {
     double x_px, y_px;
-    int n; /* 2..4 */
+    int n;               /* 2..4 */
     double angle_rad[4]; /* ascending in [0, 2 pi): sector i lies from angle i to the next */
     double level[4];
 } edge_fan_t;
 
-static double edge_fan_level(const void *scene, double x_px, double y_px)
+static inline double edge_fan_level(const void *scene, double x_px, double y_px)
 {
     const edge_fan_t *fan = scene;
     double a = atan2(y_px - fan->y_px, x_px - fan->x_px);
@@ -43,13 +43,13 @@ typedef struct edge_triangle {
     double inside, outside;
 } edge_triangle_t;
 
-static double edge_triangle_level(const void *scene, double x_px, double y_px)
+static inline double edge_triangle_level(const void *scene, double x_px, double y_px)
 {
     const edge_triangle_t *t = scene;
     for (int i = 0; i < 3; i++) {
         const int j = (i + 1) % 3;
-        const double cross = (t->x_px[j] - t->x_px[i]) * (y_px - t->y_px[i]) -
-                             (t->y_px[j] - t->y_px[i]) * (x_px - t->x_px[i]);
+        const double cross =
+            (t->x_px[j] - t->x_px[i]) * (y_px - t->y_px[i]) - (t->y_px[j] - t->y_px[i]) * (x_px - t->x_px[i]);
         if (cross < 0) return t->outside;
     }
     return t->inside;
@@ -61,7 +61,7 @@ typedef struct edge_board {
     double dark, bright;
 } edge_board_t;
 
-static double edge_board_level(const void *scene, double x_px, double y_px)
+static inline double edge_board_level(const void *scene, double x_px, double y_px)
 {
     const edge_board_t *b = scene;
     const double *h = b->board_from_image;
@@ -76,12 +76,13 @@ static double edge_board_level(const void *scene, double x_px, double y_px)
 
 /* The picture sampled once on the fine grid, then filtered separably. fine has
  * room for edge_fine_count(width, height) floats. */
-static size_t edge_fine_count(int width_px, int height_px)
+static inline size_t edge_fine_count(int width_px, int height_px)
 {
     return (size_t)(width_px + 2 * EDGE_REACH) * EDGE_SAMPLES * (size_t)(height_px + 2 * EDGE_REACH) * EDGE_SAMPLES;
 }
 
-static void edge_render(edge_level_t level, const void *scene, int width_px, int height_px, float *fine, uint8_t *px)
+static inline void edge_render(edge_level_t level, const void *scene, int width_px, int height_px, float *fine,
+                               uint8_t *px)
 {
     double weight[EDGE_TAPS], sum = 0;
     for (int i = 0; i < EDGE_TAPS; i++) {
@@ -93,9 +94,8 @@ static void edge_render(edge_level_t level, const void *scene, int width_px, int
     const int high = (height_px + 2 * EDGE_REACH) * EDGE_SAMPLES;
     for (int y = 0; y < high; y++) {
         for (int x = 0; x < wide; x++) {
-            fine[(size_t)y * (size_t)wide + (size_t)x] =
-                (float)level(scene, (x + 0.5) / EDGE_SAMPLES - EDGE_REACH - 0.5,
-                             (y + 0.5) / EDGE_SAMPLES - EDGE_REACH - 0.5);
+            fine[(size_t)y * (size_t)wide + (size_t)x] = (float)level(
+                scene, (x + 0.5) / EDGE_SAMPLES - EDGE_REACH - 0.5, (y + 0.5) / EDGE_SAMPLES - EDGE_REACH - 0.5);
         }
     }
     for (int y = 0; y < height_px; y++) {
@@ -117,7 +117,7 @@ typedef struct edge_random {
     uint64_t state;
 } edge_random_t;
 
-static double edge_uniform(edge_random_t *random, double low, double high)
+static inline double edge_uniform(edge_random_t *random, double low, double high)
 {
     random->state ^= random->state << 13;
     random->state ^= random->state >> 7;
@@ -125,14 +125,14 @@ static double edge_uniform(edge_random_t *random, double low, double high)
     return low + (high - low) * (double)(random->state >> 11) / 9007199254740992.0;
 }
 
-static double edge_normal(edge_random_t *random)
+static inline double edge_normal(edge_random_t *random)
 {
     double sum = -6.0;
     for (int i = 0; i < 12; i++) sum += edge_uniform(random, 0, 1);
     return sum;
 }
 
-static void edge_add_noise(edge_random_t *random, double variance, uint8_t *px, size_t count)
+static inline void edge_add_noise(edge_random_t *random, double variance, uint8_t *px, size_t count)
 {
     const double sd = sqrt(variance);
     for (size_t i = 0; i < count; i++) {
@@ -142,7 +142,7 @@ static void edge_add_noise(edge_random_t *random, double variance, uint8_t *px, 
 }
 
 /* Difference of two directions, 0..pi. */
-static double edge_between(double a, double b)
+static inline double edge_between(double a, double b)
 {
     const double d = fmod(fabs(a - b), 2 * EDGE_PI);
     return d > EDGE_PI ? 2 * EDGE_PI - d : d;

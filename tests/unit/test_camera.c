@@ -7,13 +7,9 @@
 #include "core/mat3.h"
 #include "thesis_tables.h"
 
-void setUp(void)
-{
-}
+void setUp(void) {}
 
-void tearDown(void)
-{
-}
+void tearDown(void) {}
 
 /* ---- the thesis' rotations ---- */
 

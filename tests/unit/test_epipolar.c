@@ -17,9 +17,7 @@ void setUp(void)
     right = oc_test_camera(&table_5_1, 1);
 }
 
-void tearDown(void)
-{
-}
+void tearDown(void) {}
 
 static void use_pair(int i)
 {
@@ -323,11 +321,11 @@ static void a_point_behind_a_camera_has_a_negative_depth(void)
     oc_pose_from_centre(R, c1, &left.pose);
     oc_pose_from_centre(R, c2, &right.pose);
     oc_midpoint_t mid;
-    TEST_ASSERT_EQUAL(OC_OK, oc_epipolar_midpoint(&left, left.k.cx_px - 50, left.k.cy_px, &right,
-                                                  right.k.cx_px + 50, right.k.cy_px, &mid));
+    TEST_ASSERT_EQUAL(OC_OK, oc_epipolar_midpoint(&left, left.k.cx_px - 50, left.k.cy_px, &right, right.k.cx_px + 50,
+                                                  right.k.cy_px, &mid));
     TEST_ASSERT_TRUE(mid.depth_left_m < -1.0 && mid.depth_right_m < -1.0);
-    TEST_ASSERT_EQUAL(OC_OK, oc_epipolar_midpoint(&left, left.k.cx_px + 50, left.k.cy_px, &right,
-                                                  right.k.cx_px - 50, right.k.cy_px, &mid));
+    TEST_ASSERT_EQUAL(OC_OK, oc_epipolar_midpoint(&left, left.k.cx_px + 50, left.k.cy_px, &right, right.k.cx_px - 50,
+                                                  right.k.cy_px, &mid));
     TEST_ASSERT_TRUE(mid.depth_left_m > 1.0 && mid.depth_right_m > 1.0);
 }
 
@@ -392,8 +390,8 @@ static void the_nearest_point_of_two_rays_is_the_midpoint(void)
         for (int i = 0; i < 4; i++) pixels[i / 2][i % 2] += 3 * oc_test_normal(&r);
         const oc_camera_t both[2] = {left, right};
         oc_midpoint_t mid;
-        TEST_ASSERT_EQUAL(OC_OK, oc_epipolar_midpoint(&left, pixels[0][0], pixels[0][1], &right, pixels[1][0],
-                                                      pixels[1][1], &mid));
+        TEST_ASSERT_EQUAL(
+            OC_OK, oc_epipolar_midpoint(&left, pixels[0][0], pixels[0][1], &right, pixels[1][0], pixels[1][1], &mid));
         TEST_ASSERT_EQUAL(OC_OK, oc_epipolar_nearest_point(both, (const double(*)[2])pixels, 2, q));
         TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-12, 0.0, oc_test_difference(mid.p_in_world, q, 3), oc_test_draw(&r, draw));
     }

@@ -7,13 +7,9 @@
 #include "core/plane.h"
 #include "thesis_tables.h"
 
-void setUp(void)
-{
-}
+void setUp(void) {}
 
-void tearDown(void)
-{
-}
+void tearDown(void) {}
 
 static void the_jacobian_is_the_numeric_derivative(void)
 {

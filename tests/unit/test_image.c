@@ -23,9 +23,7 @@ void setUp(void)
     for (size_t i = 0; i < sizeof pixels; i++) pixels[i] = (uint8_t)(i * 37u + i / 7u);
 }
 
-void tearDown(void)
-{
-}
+void tearDown(void) {}
 
 static void views_of_wrong_shape_are_refused(void)
 {

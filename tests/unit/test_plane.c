@@ -10,13 +10,9 @@
 #include "core/plane.h"
 #include "thesis_tables.h"
 
-void setUp(void)
-{
-}
+void setUp(void) {}
 
-void tearDown(void)
-{
-}
+void tearDown(void) {}
 
 /* ---- appendix B ---- */
 
@@ -33,8 +29,8 @@ static void appendix_b_omega(const double a[4], const double t[3], const double 
            fx * sw * sk * tz - u * sp * tx + u * sw * cp * ty - u * cw * cp * tz;
     H[3] = -fy * sk * cp + v * sp;
     H[4] = fy * ck * cw - fy * sk * sp * sw - v * cp * sw;
-    H[5] = fy * cp * sk * tx + fy * sw * sp * sk * ty - fy * cw * ck * ty - fy * cw * sp * sk * tz -
-           fy * sw * ck * tz - v * sp * tx + v * sw * cp * ty - v * cw * cp * tz;
+    H[5] = fy * cp * sk * tx + fy * sw * sp * sk * ty - fy * cw * ck * ty - fy * cw * sp * sk * tz - fy * sw * ck * tz -
+           v * sp * tx + v * sw * cp * ty - v * cw * cp * tz;
     H[6] = sp;
     H[7] = -cp * sw;
     H[8] = -sp * tx + sw * cp * ty - cw * cp * tz;
@@ -55,8 +51,8 @@ static void appendix_b_pan(const double a[4], const double t[3], const double an
            fx * sy * st * tz + u * st * sp * tx + u * st * cp * ty - u * ct * tz;
     H[3] = -fy * sy * cp + fy * cy * ct * sp - v * st * sp;
     H[4] = fy * sy * sp + fy * cy * ct * cp - v * st * cp;
-    H[5] = fy * sy * cp * tx - fy * cy * ct * sp * tx - fy * sy * sp * ty - fy * cy * ct * cp * ty -
-           fy * cy * st * tz + v * st * sp * tx + v * st * cp * ty - v * ct * tz;
+    H[5] = fy * sy * cp * tx - fy * cy * ct * sp * tx - fy * sy * sp * ty - fy * cy * ct * cp * ty - fy * cy * st * tz +
+           v * st * sp * tx + v * st * cp * ty - v * ct * tz;
     H[6] = -st * sp;
     H[7] = -st * cp;
     H[8] = st * sp * tx + st * cp * ty - ct * tz;
@@ -89,8 +85,10 @@ static void planar_perspective_matrix_is_the_corrected_expansion_of_appendix_b(v
         const double a[4] = {-c.k.fx_px, c.k.fy_px, c.k.cx_px, c.k.cy_px};
         const double minus_column[3] = {-P[2], -P[6], -P[10]};
         for (int form = 0; form < 2; form++) {
-            if (form == 0) appendix_b_omega(a, t, opk, expected, third);
-            else appendix_b_pan(a, t, pts, expected, third);
+            if (form == 0)
+                appendix_b_omega(a, t, opk, expected, third);
+            else
+                appendix_b_pan(a, t, pts, expected, third);
             for (int i = 0; i < 9; i++) expected[i] = -expected[i];
             TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-8, 0.0, oc_test_difference(expected, H, 9), where);
             TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-9, 0.0, oc_test_difference(third, minus_column, 3), where);

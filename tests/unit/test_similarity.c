@@ -16,9 +16,7 @@ void setUp(void)
     TEST_ASSERT_EQUAL(OC_OK, oc_similarity_from_points(120, 340, 220, 245, 0.150, &map));
 }
 
-void tearDown(void)
-{
-}
+void tearDown(void) {}
 
 /* ---- Eq 7.1-7.7 ---- */
 

@@ -11,13 +11,9 @@
 #include "core/silhouette.h"
 #include "thesis_tables.h"
 
-void setUp(void)
-{
-}
+void setUp(void) {}
 
-void tearDown(void)
-{
-}
+void tearDown(void) {}
 
 static const oc_test_table_t *const tables[4] = {&table_5_1, &table_5_2, &table_7_1, &table_7_3};
 

@@ -16,9 +16,7 @@ void setUp(void)
     use_scene(&scenes[0]);
 }
 
-void tearDown(void)
-{
-}
+void tearDown(void) {}
 
 /* ---- preparing a pair ---- */
 
@@ -58,7 +56,8 @@ static void margins_that_are_zero_leave_only_pixel_noise(void)
     for (int i = 0; i < 2; i++) {
         const double dx = i ? 0 : 1e-3, dy = i ? 1e-3 : 0;
         const double slope = (oc_epipolar_distance_px(pair.F, 320 + dx, 240 + dy, w.x_px, w.y_px) -
-                              oc_epipolar_distance_px(pair.F, 320 - dx, 240 - dy, w.x_px, w.y_px)) / 2e-3;
+                              oc_epipolar_distance_px(pair.F, 320 - dx, 240 - dy, w.x_px, w.y_px)) /
+                             2e-3;
         TEST_ASSERT_TRUE(slope * slope > 1e-3);
         gradient2 += slope * slope;
     }

@@ -14,9 +14,7 @@ void setUp(void)
     use_scene(&scenes[0]);
 }
 
-void tearDown(void)
-{
-}
+void tearDown(void) {}
 
 static bool in_image(double x, double y)
 {
@@ -29,8 +27,7 @@ typedef struct coverage {
     double area_px2, area_thesis_px2, width_px; /* sums */
 } coverage_t;
 
-static void count_ground(const oc_camera_t *l, const oc_camera_t *r, double p[3], oc_test_random_t *rnd,
-                         coverage_t *c)
+static void count_ground(const oc_camera_t *l, const oc_camera_t *r, double p[3], oc_test_random_t *rnd, coverage_t *c)
 {
     double x, y, x2, y2;
     p[2] = 0.0;
@@ -106,8 +103,8 @@ static void covariance_windows_and_strips_cover_99_per_cent_where_the_thesis_cov
         const double n = c.n_ground / 100.0, m = c.n_points / 100.0;
         snprintf(text, sizeof text,
                  "%s: window %.1f %% (thesis %.1f), strip %.1f %% (thesis %.1f), segment %.1f %%; seed %d",
-                 thesis_pairs[scenes[i].pair].name, c.window / n, c.window_thesis / n, c.strip / m,
-                 c.strip_thesis / m, c.segment / m, 1900 + i);
+                 thesis_pairs[scenes[i].pair].name, c.window / n, c.window_thesis / n, c.strip / m, c.strip_thesis / m,
+                 c.segment / m, 1900 + i);
         TEST_MESSAGE(text);
         /* The price: mean area and width, printed so that docs/equations.md can be checked. */
         char price[120];

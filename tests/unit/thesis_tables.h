@@ -14,8 +14,8 @@
 #include "core/mat3.h"
 
 #define OC_TEST_PI 3.14159265358979323846
-#define OC_TEST_RAD(degrees) ((degrees) * OC_TEST_PI / 180.0)
-#define OC_TEST_DEG(radians) ((radians) * 180.0 / OC_TEST_PI)
+#define OC_TEST_RAD(degrees) ((degrees)*OC_TEST_PI / 180.0)
+#define OC_TEST_DEG(radians) ((radians)*180.0 / OC_TEST_PI)
 
 /* ---- cameras ---- */
 

@@ -19,8 +19,8 @@ typedef struct scene {
     double margin_deg, centre_x, centre_y, half, height;
 } scene_t;
 
-static const scene_t scenes[3] = {{0, 0.8, 0.0, 0.0, 0.6, 0.5}, {1, 0.8, 0.05, 0.0, 0.1, 0.08},
-                                  {3, 1.0, 0.17, 0.15, 0.35, 0.19}};
+static const scene_t scenes[3] = {
+    {0, 0.8, 0.0, 0.0, 0.6, 0.5}, {1, 0.8, 0.05, 0.0, 0.1, 0.08}, {3, 1.0, 0.17, 0.15, 0.35, 0.19}};
 
 static oc_camera_t left, right;
 static oc_margin_t margin;
@@ -33,8 +33,7 @@ static inline void use_scene(const scene_t *scene)
     left = oc_test_camera(p->table, p->left);
     right = oc_test_camera(p->table, p->right);
     for (int i = 0; i < 6; i++) margin.v[i] = i < 3 ? 0.010 : OC_TEST_RAD(scene->margin_deg);
-    TEST_ASSERT_EQUAL(OC_OK,
-                      oc_pair_prepare(&pair, &left, &margin, &right, &margin, OC_ANGLE_ERROR_OPK, SIGMA_PX));
+    TEST_ASSERT_EQUAL(OC_OK, oc_pair_prepare(&pair, &left, &margin, &right, &margin, OC_ANGLE_ERROR_OPK, SIGMA_PX));
     TEST_ASSERT_EQUAL(OC_OK, oc_pair_prepare_thesis(&thesis, &left, &margin, &right, &margin));
 }
 

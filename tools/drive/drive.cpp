@@ -155,10 +155,16 @@ void add_options(const DriveOptions &options)
 
 } // namespace
 
+void check_link(const std::string &link)
+{
+    link_keys(link);
+}
+
 void drive(const DriveOptions &options)
 {
     const fs::path out = options.out;
-    link_keys(options.link); // say what is wrong before anything is made
+    check_link(options.link);        // say what is wrong before anything is made
+    fs::remove(out / "report.json"); // the sign of a finished run
     fs::create_directories(out / "vehicle");
     fs::create_directories(out / "base");
     const ReportedSite site = write_reported_site(options.site, (out / "vehicle" / "cameras.json").string());

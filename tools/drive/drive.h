@@ -19,6 +19,9 @@ struct DriveOptions {
     double timeout_s = 900;
 };
 
+// Throws std::runtime_error with one line when `link` is none of these.
+void check_link(const std::string &link);
+
 // Runs both ends until the base has settled. Throws std::runtime_error with one line.
 void drive(const DriveOptions &options);
 

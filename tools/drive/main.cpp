@@ -47,6 +47,7 @@ int main(int argc, char **argv)
     }
     if (angle_deg >= 0) options.site.margin_angle_rad = angle_deg * 0.017453292519943295;
     try {
+        outcrop::check_link(options.link);
         if (!perturb.empty()) options.site.perturbation = outcrop::parse_perturbation(perturb);
     } catch (const std::exception &fault) {
         std::fprintf(stderr, "outcrop-drive: %s\n", fault.what());
