@@ -85,6 +85,7 @@ void ClusterOptions::check() const
         throw std::invalid_argument("cluster: t_M must be >= 0, its shares ascending in (0, 1]");
     if (!(z_weight > 0) || !(z_weight <= 1) || min_suspected < 1 || min_points < min_suspected)
         throw std::invalid_argument("cluster: z_weight in (0, 1], 1 <= min_suspected <= min_points");
+    if (!(group_reach >= 0)) throw std::invalid_argument("cluster: group_reach must be >= 0");
     if (!(covariance_sigmas >= 0)) throw std::invalid_argument("cluster: covariance_sigmas must be >= 0");
 }
 
@@ -135,6 +136,39 @@ double automatic_threshold(const std::vector<double> &edges, double lowest, doub
     return threshold;
 }
 
+namespace {
+
+// Least distance between two groups.
+double distance_between(const std::vector<Vector3d> &points, const std::vector<int> &a, const std::vector<int> &b)
+{
+    double least = std::numeric_limits<double>::infinity();
+    for (const int i : a) {
+        for (const int j : b)
+            least = std::min(least, (points[static_cast<std::size_t>(i)] - points[static_cast<std::size_t>(j)]).norm());
+    }
+    return least;
+}
+
+// Groups nearer than reach become one, the nearest pair first reached in order; members stay ascending.
+void join_groups(const std::vector<Vector3d> &points, double reach, std::vector<std::vector<int>> *groups)
+{
+    for (std::size_t a = 0; a < groups->size(); ++a) {
+        for (std::size_t b = a + 1; b < groups->size();) {
+            if (distance_between(points, (*groups)[a], (*groups)[b]) > reach) {
+                ++b;
+                continue;
+            }
+            auto &joined = (*groups)[a];
+            joined.insert(joined.end(), (*groups)[b].begin(), (*groups)[b].end());
+            std::sort(joined.begin(), joined.end());
+            groups->erase(groups->begin() + static_cast<std::ptrdiff_t>(b));
+            b = a + 1; // the larger group may reach farther
+        }
+    }
+}
+
+} // namespace
+
 Clusters cluster_points(const std::vector<SitePoint> &points, double diagonal_m, const ClusterOptions &options)
 {
     options.check();
@@ -154,15 +188,18 @@ Clusters cluster_points(const std::vector<SitePoint> &points, double diagonal_m,
         if (label[i] >= static_cast<int>(members.size())) members.emplace_back();
         members[static_cast<std::size_t>(label[i])].push_back(static_cast<int>(i));
     }
-    clusters.label.assign(points.size(), -1);
     for (const std::vector<int> &group : members) {
         const int n = static_cast<int>(group.size());
-        if (n < options.min_suspected) continue;
-        const bool is_whole = n >= options.min_points;
-        const int number = is_whole ? static_cast<int>(clusters.groups.size()) : -2;
-        for (const int i : group) clusters.label[static_cast<std::size_t>(i)] = number;
-        (is_whole ? clusters.groups : clusters.suspected).push_back(group);
+        if (n >= options.min_suspected)
+            (n >= options.min_points ? clusters.groups : clusters.suspected).push_back(group);
     }
+    if (options.t_m_m == 0)
+        join_groups(flat, std::min(options.group_reach * t_m, options.max_t_m_share * diagonal_m), &clusters.groups);
+    clusters.label.assign(points.size(), -1);
+    for (const std::vector<int> &group : clusters.suspected)
+        for (const int i : group) clusters.label[static_cast<std::size_t>(i)] = -2;
+    for (std::size_t g = 0; g < clusters.groups.size(); ++g)
+        for (const int i : clusters.groups[g]) clusters.label[static_cast<std::size_t>(i)] = static_cast<int>(g);
     return clusters;
 }
 

@@ -15,6 +15,8 @@ struct ClusterOptions {
     double min_t_m_share = 0.02; // bounds of the automatic t_M, shares of the area's diagonal
     double max_t_m_share = 0.06;
     double z_weight = 0.35;       // obstacles stand on the ground: a step up counts less than one sideways; 1: thesis
+    double group_reach = 1.5;     // whole groups nearer than this many automatic t_M are one (a sparse body may be torn
+                                  // where a stray point must not be let in); still under max_t_m_share
     int min_points = 5;           // fewer: suspected
     int min_suspected = 2;        // fewer: noise
     double covariance_sigmas = 0; // distances shrink by so many sigmas of the two points, but not below half; 0: thesis

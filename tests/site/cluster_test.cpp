@@ -192,6 +192,28 @@ TEST(ClusterPoints, tells_objects_apart_and_sets_stragglers_aside)
     EXPECT_EQ(clusters.label[0], 0);
 }
 
+TEST(ClusterPoints, joins_the_halves_of_a_torn_body_but_lets_no_stray_point_in)
+{
+    // Two halves 0.44 apart and a stray point as far off again; dense boxes elsewhere put t_M at sqrt(0.3 * 0.44).
+    std::vector<SitePoint> points;
+    for (const double x : {0.0, 0.1, 0.2, 0.3, 0.6}) points.push_back(at(x, 0, 0.2));
+    for (const double x : {1.04, 1.14, 1.24, 1.34, 1.44}) points.push_back(at(x, 0, 0.2));
+    points.push_back(at(1.92, 0, 0.2));
+    const Clusters joined = cluster_points(points, 14);
+    EXPECT_NEAR(joined.t_m_m, std::sqrt(0.3 * 0.44), 1e-9);
+    ASSERT_EQ(joined.groups.size(), 1u);
+    EXPECT_EQ(joined.groups[0].size(), 10u);
+    EXPECT_TRUE(std::is_sorted(joined.groups[0].begin(), joined.groups[0].end()));
+    EXPECT_EQ(joined.label, (std::vector<int>{0, 0, 0, 0, 0, 0, 0, 0, 0, 0, -1}));
+
+    ClusterOptions apart;
+    apart.group_reach = 1;
+    EXPECT_EQ(cluster_points(points, 14, apart).groups.size(), 2u);
+    apart = ClusterOptions{};
+    apart.t_m_m = joined.t_m_m; // a given t_M is taken by the letter
+    EXPECT_EQ(cluster_points(points, 14, apart).groups.size(), 2u);
+}
+
 TEST(ClusterPoints, lets_height_count_less_unless_told_otherwise)
 {
     std::vector<SitePoint> points;
