@@ -120,6 +120,7 @@ static bool stored_next(const oc_image_sender_t *sender, stored_image_t *image, 
     if (!image->is_sent) {
         if (stored_cut(sender, image, image->next_piece, packet, buf, n_bytes, &taken)) {
             image->next_piece++;
+            image->is_sent = image->next_piece * image->piece_bytes >= image->n_bytes;
             return true;
         }
         image->is_sent = true;
@@ -128,6 +129,15 @@ static bool stored_next(const oc_image_sender_t *sender, stored_image_t *image, 
         if (!(image->resend >> i & 1u)) continue;
         image->resend &= ~(1u << i);
         if (stored_cut(sender, image, i, packet, buf, n_bytes, &taken)) return true;
+    }
+    return false;
+}
+
+bool oc_image_sender_has_next(const oc_image_sender_t *sender)
+{
+    for (uint32_t i = 0; i < sender->n_images; i++) {
+        const stored_image_t *image = &sender->images[i];
+        if (image->is_used && (!image->is_sent || image->resend != 0)) return true;
     }
     return false;
 }

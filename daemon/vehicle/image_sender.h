@@ -23,6 +23,9 @@ bool oc_image_sender_push(oc_image_sender_t *sender, const oc_view_head_t *head,
 /* Queue pieces of a stored keyframe again; false when it has gone. */
 bool oc_image_sender_resend(oc_image_sender_t *sender, const oc_resend_request_t *request);
 
+/* Whether there may be a next datagram. */
+bool oc_image_sender_has_next(const oc_image_sender_t *sender);
+
 /* The next datagram, at most datagram_bytes into buf; false when there is none. */
 bool oc_image_sender_next(oc_image_sender_t *sender, const oc_packet_head_t *packet, uint8_t *buf, size_t *n_bytes);
 

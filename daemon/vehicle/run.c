@@ -250,6 +250,7 @@ static bool run_send_next(vehicle_run_t *run)
 {
     size_t n_bytes = 0;
     if (run->images) {
+        if (!oc_image_sender_has_next(run->images)) return false; /* and spare the number of a packet */
         const oc_packet_head_t head = run_packet_head(run);
         if (!oc_image_sender_next(run->images, &head, run->packet, &n_bytes)) return false;
         return run_send(run, n_bytes);

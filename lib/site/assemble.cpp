@@ -123,7 +123,8 @@ FeedResult PacketAssembler::take_patch(const Bytes &datagram)
         Block fresh;
         fresh.quality = patch->quality;
         std::copy(std::begin(patch->px[i]), std::end(patch->px[i]), fresh.px.begin());
-        const auto known = view->blocks.find(patch->blocks[i]);
+        const std::pair<std::uint16_t, std::uint16_t> key{patch->blocks_per_row, patch->blocks[i]};
+        const auto known = view->blocks.find(key);
         if (known == view->blocks.end()) {
             if (n_blocks_ >= options_.max_blocks) return FeedResult::kFull;
             ++n_blocks_;
@@ -131,7 +132,7 @@ FeedResult PacketAssembler::take_patch(const Bytes &datagram)
             const Block &old = known->second;
             if (old.quality > fresh.quality || (old.quality == fresh.quality && old.px <= fresh.px)) continue;
         }
-        view->blocks[patch->blocks[i]] = fresh;
+        view->blocks[key] = fresh;
         view->is_dirty = true;
         result = FeedResult::kTaken;
     }
@@ -249,7 +250,9 @@ View PacketAssembler::build(int id, const Entry &entry)
 
     view.grey = cv::Mat1b::zeros(static_cast<int>(view.camera.k.height_px), static_cast<int>(view.camera.k.width_px));
     view.known = cv::Mat1b::zeros(view.grey.size());
-    for (const auto &[index, block] : entry.blocks) paint_block(index, block.px, &view);
+    const auto per_row = (view.camera.k.width_px + OC_BLOCK_PX - 1) / OC_BLOCK_PX;
+    for (const auto &[key, block] : entry.blocks)
+        if (key.first == per_row) paint_block(key.second, block.px, &view);
     return view;
 }
 

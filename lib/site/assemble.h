@@ -102,7 +102,8 @@ private:
         std::int64_t utime_us = 0;
         std::map<int, Part> parts; // of that capture time only
         std::set<Relabel> relabels;
-        std::map<std::uint16_t, Block> blocks;
+        // By blocks per row of the image they were cut from, and index; only those of the view's own width show.
+        std::map<std::pair<std::uint16_t, std::uint16_t>, Block> blocks;
         bool is_dirty = true;
     };
 

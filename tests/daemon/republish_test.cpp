@@ -12,14 +12,13 @@
 namespace outcrop {
 namespace {
 
-struct Listener {
-    void on_view(const lcm::ReceiveBuffer *, const std::string &channel, const view_t *message)
-    {
-        EXPECT_EQ(channel, "OUTCROP_VIEW");
-        views.push_back(*message);
-    }
-    std::vector<view_t> views;
-};
+using Views = std::vector<view_t>;
+
+void on_view(const lcm::ReceiveBuffer *, const std::string &channel, const view_t *message, Views *views)
+{
+    EXPECT_EQ(channel, "OUTCROP_VIEW");
+    views->push_back(*message);
+}
 
 View some_view()
 {
@@ -50,16 +49,16 @@ TEST(Republisher, says_a_view_once_and_in_full)
 {
     const auto lcm = std::make_shared<lcm::LCM>("memq://");
     ASSERT_TRUE(lcm->good());
-    Listener listener;
-    lcm->subscribe("OUTCROP_VIEW", &Listener::on_view, &listener);
+    Views views;
+    lcm->subscribeFunction("OUTCROP_VIEW", on_view, &views);
     Republisher republisher(lcm);
     const View view = some_view();
     republisher.publish(7, view);
     republisher.publish(7, view);
     while (lcm->handleTimeout(50) > 0) {
     }
-    ASSERT_EQ(listener.views.size(), 1u);
-    const view_t &got = listener.views[0];
+    ASSERT_EQ(views.size(), 1u);
+    const view_t &got = views[0];
     EXPECT_EQ(got.utime, view.utime_us);
     EXPECT_EQ(got.vehicle, 7);
     EXPECT_EQ(got.view, 12);

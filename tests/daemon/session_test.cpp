@@ -191,6 +191,16 @@ TEST(Session, ignores_other_vehicles_and_counts_what_is_ill_formed)
     EXPECT_EQ(other.receive(packet.data(), packet.size(), 1), FeedResult::kForeign);
     EXPECT_TRUE(other.views().empty());
 
+    Session first_heard({}, {});
+    EXPECT_EQ(first_heard.receive(packet.data(), packet.size(), 1), FeedResult::kTaken);
+    const oc_packet_head_t head{0, FakeVehicle::kId + 1, 0};
+    const oc_announce_t announce{9, 1000};
+    Packet foreign(100);
+    std::size_t n_bytes = 0;
+    ASSERT_EQ(oc_packet_encode_announce(&head, &announce, foreign.data(), foreign.size(), &n_bytes), OC_OK);
+    EXPECT_EQ(first_heard.receive(foreign.data(), n_bytes, 2), FeedResult::kForeign);
+    EXPECT_EQ(first_heard.vehicle(), FakeVehicle::kId);
+
     Session session({}, {});
     for (std::size_t i = 0; i < packet.size(); i++) {
         Packet bad = packet;

@@ -61,7 +61,8 @@ static uint32_t drain(uint16_t view)
     oc_image_piece_t piece;
     uint32_t n = 0, at = 0, size = 0;
     bool is_last = false;
-    while (next(&piece)) {
+    while (oc_image_sender_has_next(sender)) {
+        TEST_ASSERT_TRUE(next(&piece));
         TEST_ASSERT_FALSE(is_last);
         TEST_ASSERT_EQUAL(view, piece.head.view);
         TEST_ASSERT_EQUAL(n, piece.head.part);
@@ -77,6 +78,7 @@ static uint32_t drain(uint16_t view)
         n++;
     }
     TEST_ASSERT_TRUE(is_last);
+    TEST_ASSERT_FALSE(next(&piece));
     TEST_ASSERT_EQUAL(piece.total_bytes, at);
     return n;
 }

@@ -72,10 +72,11 @@ public:
         });
     }
 
-    Bytes patch(std::uint16_t view, std::uint8_t quality, const std::vector<std::uint16_t> &blocks, std::uint8_t grey)
+    Bytes patch(std::uint16_t view, std::uint8_t quality, const std::vector<std::uint16_t> &blocks, std::uint8_t grey,
+                std::uint32_t width_px = 640)
     {
-        const Bytes pixels(640 * 480, grey);
-        const oc_image_t image{pixels.data(), 640, 480, 640, 1};
+        const Bytes pixels(width_px * 480, grey);
+        const oc_image_t image{pixels.data(), width_px, 480, width_px, 1};
         const oc_packet_head_t packet = head(OC_PACKET_PATCH);
         std::uint16_t taken = 0;
         const Bytes bytes = encoded([&](std::uint8_t *buf, std::size_t cap, std::size_t *n) {
@@ -207,6 +208,23 @@ TEST(Assemble, makes_views_of_parts_labels_and_pixels)
     const std::map<int, std::uint32_t> missing = assembler.missing();
     ASSERT_EQ(missing.size(), 1u) << "view 7 exists, says the status, and nothing of it came";
     EXPECT_EQ(missing.at(7), 0xffffffffu);
+}
+
+TEST(Assemble, does_not_paint_pixels_that_were_cut_for_another_width)
+{
+    Encoder encoder(1);
+    const std::vector<Bytes> parts = encoder.view(3, 50, 1300);
+    const Bytes narrow = encoder.patch(3, 20, {0, 45}, 200, 320), wide = encoder.patch(3, 5, {45}, 100);
+    for (const bool is_narrow_first : {true, false}) {
+        PacketAssembler assembler;
+        assembler.feed(is_narrow_first ? narrow : wide);
+        for (const Bytes &part : parts) assembler.feed(part);
+        assembler.feed(is_narrow_first ? wide : narrow);
+        const View &view = assembler.views().at(3);
+        EXPECT_EQ(cv::countNonZero(view.known), 64);
+        EXPECT_EQ(view.known(0, 45 * 8), 255);
+        EXPECT_NEAR(view.grey(0, 45 * 8), 100, 6);
+    }
 }
 
 TEST(Assemble, is_a_function_of_the_set_of_packets)

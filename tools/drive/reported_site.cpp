@@ -85,6 +85,15 @@ public:
         }
     }
 
+    // A wrong mount turns about the camera's axes, which some views see as more than its share of a world axis: shrinks
+    // it until it is inside the margins of all of them.
+    void fit_mount(const std::vector<oc_pose_t> &poses)
+    {
+        for (double excess = greatest_excess(poses); kind_ == "mount" && excess > 1; excess = greatest_excess(poses)) {
+            for (double &value : common_) value /= excess * (1 + 1e-6);
+        }
+    }
+
     oc_pose_t move(const oc_pose_t &pose)
     {
         oc_pose_t moved;
@@ -101,6 +110,26 @@ public:
     }
 
 private:
+    // The largest error in any view, as a multiple of its margin.
+    double greatest_excess(const std::vector<oc_pose_t> &poses) const
+    {
+        const oc_pose_t mount = wrong_mount();
+        double excess = 0;
+        for (const oc_pose_t &pose : poses) {
+            oc_pose_t moved;
+            oc_pose_compose(&mount, &pose, &moved);
+            oc_pose6_t before, after;
+            oc_pose_to_6(&pose, &before);
+            oc_pose_to_6(&moved, &after);
+            for (int i = 0; i < 6; i++) {
+                double error = std::abs(after.v[i] - before.v[i]);
+                if (i >= 3) error = std::min(error, 2 * kPi - error);
+                if (margin_[i] > 0) excess = std::max(excess, error / margin_[i]);
+            }
+        }
+        return excess;
+    }
+
     // The same small turn and shift in every camera's own frame.
     oc_pose_t wrong_mount() const
     {
@@ -165,9 +194,15 @@ void fill_margins(const json &root, double metres_per_unit, ReportedSiteOptions 
 json reported(const json &root, const fs::path &folder, ReportedSiteOptions options, ReportedSite *site)
 {
     const std::string units = root.at("units").get<std::string>();
+    if (units != "m" && units != "mm") throw std::runtime_error("\"units\" must be \"mm\" or \"m\"");
+    if (root.at("views").size() < 2)
+        throw std::runtime_error("\"views\": needs at least two, has " + std::to_string(root.at("views").size()));
     const double metres_per_unit = units == "mm" ? 1e-3 : 1.0;
     fill_margins(root, metres_per_unit, &options);
     PoseMover mover(options.perturbation, options.margin_position_m, options.margin_angle_rad);
+    std::vector<oc_pose_t> poses;
+    for (const json &view : root.at("views")) poses.push_back(pose_of(view, metres_per_unit));
+    if (options.perturbation.is_on) mover.fit_mount(poses);
     json out = root;
     out["margins"] = {{"position", options.margin_position_m / metres_per_unit},
                       {"angle_deg", options.margin_angle_rad * 180 / kPi}};
@@ -219,7 +254,7 @@ ReportedSite write_reported_site(const ReportedSiteOptions &options, const std::
         throw std::runtime_error(file.string() + ": " + fault.what());
     } catch (const std::runtime_error &fault) {
         const std::string what = fault.what();
-        if (what.find(": ") != std::string::npos && what.rfind("--", 0) != 0 && what[0] != '"') throw;
+        if (what.find(": ") != std::string::npos && what.rfind("--", 0) != 0 && what[0] != '"') throw; // names a file
         throw std::runtime_error(file.string() + ": " + what);
     }
     const fs::path path = file.parent_path() / "path.json";
