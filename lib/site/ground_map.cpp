@@ -33,7 +33,7 @@ public:
         map_.x_min = area.x_min;
         map_.y_max = area.y_max;
         map_.codes.create(cells(area.y_max - area.y_min), cells(area.x_max - area.x_min));
-        map_.codes.setTo(0);
+        map_.codes.setTo(static_cast<int>(GroundCode::kUnseen));
         for (const RefinedView &view : model.views) eyes_.push_back({view.camera, camera_centre(view.camera)});
         for (const RefinedView &view : model.views) {
             const auto *sigma = view.posterior.v;

@@ -11,7 +11,8 @@
 
 namespace outcrop {
 
-enum class GroundCode : std::uint8_t { kUnseen = 0, kFree = 1, kObstacle = 2, kSuspected = 3 };
+// Grey levels that a person can tell apart when the map is opened as a picture.
+enum class GroundCode : std::uint8_t { kUnseen = 96, kFree = 255, kObstacle = 0, kSuspected = 176 };
 
 struct GroundMapOptions {
     double cell_m = 0;            // 0: the area's longer side / 400
