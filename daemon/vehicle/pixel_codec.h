@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause
  * Colour pictures into bytes: WebP for ground tiles, JPEG or WebP for whole frames.
- * The codecs allocate; they run beside the frame path, never on it. */
+ * The codecs allocate, and they run in the daemon's one thread: for a tile when no frame and no other packet is due,
+ * for a whole frame (the null rival) when it is taken. No call into lib/vehicle is under way then. */
 #ifndef OUTCROP_DAEMON_PIXEL_CODEC_H
 #define OUTCROP_DAEMON_PIXEL_CODEC_H
 

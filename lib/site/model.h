@@ -44,11 +44,12 @@ struct MatchPass {
 };
 using Matcher = std::function<std::vector<PairMatches>(const MatchPass &)>;
 
-// Refinement on the ties -> pairs -> matches in strips of the margins -> tracks -> refinement -> matches again in the posterior's strips ->
-// tracks -> points -> clusters -> boxes. A pure function of the views as a set: they are sorted by id first, sums run
-// in fixed order, one thread. Bit-identical between calls (SiteModel::ms apart). area empty: derive_area.
-// Fewer than two views give a model without points. Throws std::invalid_argument for options out of range, ids that
-// appear twice and cameras or margins that are not valid.
+// Refinement on the ties -> pairs -> sure matches in the posterior's strips -> tracks -> refinement -> all matches in
+// the new posterior's strips, checked in third views -> tracks -> refinement -> points -> clusters -> boxes. A pure
+// function of the views as a set: they are sorted by id first, sums run in fixed order, one thread. Bit-identical
+// between calls (SiteModel::ms apart). area empty: derive_area. Fewer than two views give a model without points.
+// Throws std::invalid_argument for options out of range, ids that appear twice and cameras or margins that are not
+// valid.
 SiteModel build_site(const std::vector<View> &views, const std::optional<Area> &area, const BuildOptions &options = {});
 
 // The same with another matcher; what build_site and the tests share.

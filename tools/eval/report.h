@@ -31,7 +31,7 @@ struct Report {
 /* Reads both folders and holds one against the other. Throws EvalError. */
 Report evaluate(const std::filesystem::path &site, const std::filesystem::path &dir, Notes &notes);
 
-/* The keys of docs/design.md (outcrop-eval --json); null for what is empty. */
+/* The keys of docs/operating.md, section 8 (outcrop-eval --json); null for what is empty. */
 nlohmann::ordered_json to_json(const Report &report);
 
 /* The same as aligned text. */

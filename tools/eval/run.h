@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause
- * What a run wrote into its DIR (design.md section 8). */
+ * What a run wrote into its DIR (docs/operating.md, section 6). */
 #ifndef OUTCROP_EVAL_RUN_H
 #define OUTCROP_EVAL_RUN_H
 

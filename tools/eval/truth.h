@@ -16,7 +16,7 @@
 
 namespace outcrop::eval {
 
-/* Mask codes of a site (design.md section 7). */
+/* Mask codes of a site (docs/operating.md, section 8). */
 constexpr int kMaskGround = 0;
 constexpr int kMaskLitter = 254; /* under 8 mm high: counts as ground */
 constexpr int kMaskNothing = 255;
