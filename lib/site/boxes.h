@@ -17,7 +17,7 @@ struct BoxOptions {
     double isolation = 3.0;
     int min_isolation_points = 8;
     double trim_share = 0.02;  // of the points may lie outside at each end ...
-    double trim_gap = 0.9;     // ... but only while each widens the extent of the rest by more than this share
+    double trim_gap = 0.4;     // ... but only while each widens the extent of the rest by more than this share
     double widen_sigmas = 1.0; // of the outermost points, on every side but the ground's
     double widen_gaps = 1.0;   // mean gaps between the points along a side that the body goes on beyond the outermost:
                                // the unbiased end of a uniform sample; 0: thesis

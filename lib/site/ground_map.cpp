@@ -107,10 +107,18 @@ private:
             for (int col = col_from; col < col_to; ++col) paint_cell(row, col, cell_centre(row, col));
     }
 
+    // A point that its box leaves out as a straggler is doubtful ground, like one without a box.
+    bool is_in_its_box(const SitePoint &p) const
+    {
+        if (p.obstacle < 0) return false;
+        const Obstacle &box = model_.obstacles.at(static_cast<std::size_t>(p.obstacle));
+        return footprint_contains(box, p.position.x(), p.position.y());
+    }
+
     void paint_points()
     {
         for (const SitePoint &p : model_.points) {
-            if (p.obstacle >= 0) continue;
+            if (is_in_its_box(p)) continue;
             const double sigma = std::sqrt(std::max(p.covariance(0, 0), p.covariance(1, 1)));
             const double reach =
                 std::max(options_.point_sigmas * sigma, options_.min_point_cells * map_.metres_per_pixel);

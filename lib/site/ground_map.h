@@ -32,7 +32,7 @@ struct GroundMap {
 };
 
 // obstacle: inside a box's footprint. suspected: inside a suspected one's, in the ring round any, or near an
-// obstacle point without a box. free: else, and seen by min_views views whose line of sight meets no box.
+// obstacle point that no box holds. free: else, and seen by min_views views whose line of sight meets no box.
 // Everything else is unseen. Cost: cells * views * boxes.
 GroundMap map_ground(const SiteModel &model, const GroundMapOptions &options = {});
 

@@ -272,8 +272,11 @@ TEST(GroundMap, holds_boxes_rings_suspects_and_stray_points)
     SiteModel model = model_with_box();
     const std::vector<SitePoint> small = {at({0.3, 0.3, 0.05}), at({0.32, 0.3, 0.05})};
     model.suspected.push_back(fit_box(small, {0, 1}, 1));
-    model.points = {at({0.4, 0.1, 0.1}, 0.01)};
+    model.points = {at({0.4, 0.1, 0.1}, 0.01), at({0.1, 0.1, 0.1}, 0.01), at({0.4, -0.1, 0.1}, 0.01)};
+    model.points[1].obstacle = 0;
+    model.points[2].obstacle = 0; // of the box's cluster, but left out of the box
     const GroundMap map = map_ground(model);
+    EXPECT_EQ(code_at(map, 0.4, -0.1), GroundCode::kSuspected);
     EXPECT_EQ(code_at(map, 0.1, 0.1), GroundCode::kObstacle);
     EXPECT_EQ(code_at(map, 0.31, 0.3), GroundCode::kSuspected);
     EXPECT_EQ(code_at(map, 0.4, 0.1), GroundCode::kSuspected);
