@@ -83,7 +83,7 @@ void NullRival::decode(Keyframe *keyframe)
     keyframe->rgb = copy;
 }
 
-void NullRival::push(oc_vehicle_t *vehicle, int id, const Keyframe &keyframe, PacketAssembler *assembler) const
+void NullRival::push(oc_vehicle_t *vehicle, int id, const Keyframe &keyframe, PacketAssembler *assembler)
 {
     oc_frame_t frame{};
     frame.image = image_of(keyframe.rgb);
@@ -97,7 +97,10 @@ void NullRival::push(oc_vehicle_t *vehicle, int id, const Keyframe &keyframe, Pa
     frame.view_id = static_cast<std::uint16_t>(id);
     frame.is_forced = true;
     oc_push_report_t report;
-    if (oc_vehicle_push(vehicle, &frame, &report) != OC_OK) return;
+    if (oc_vehicle_push(vehicle, &frame, &report) != OC_OK) {
+        n_refused_++;
+        return;
+    }
     for (;;) {
         std::uint8_t packet[OC_MAX_DATAGRAM_BYTES];
         std::size_t packet_bytes = 0;
@@ -124,6 +127,7 @@ std::map<int, View> NullRival::make_views(const std::optional<Area> &area)
         throw std::runtime_error("cannot set up the vehicle's pipeline for whole images");
 
     PacketAssembler assembler;
+    n_refused_ = 0;
     for (const auto &[id, keyframe] : keyframes_) {
         if (!keyframe.rgb.empty()) push(vehicle, id, keyframe, &assembler);
     }

@@ -33,6 +33,9 @@ public:
     // known. A function of the set of pieces.
     std::map<int, View> make_views(const std::optional<Area> &area);
 
+    // Whole keyframes that the vehicle's code would not take, at the last make_views.
+    std::uint64_t refused() const { return n_refused_; }
+
     // Pieces to ask for again, as PacketAssembler::missing. Views that were
     // announced have no pieces.
     std::map<int, std::uint32_t> missing(const std::optional<oc_vehicle_status_t> &status,
@@ -57,9 +60,10 @@ private:
 
     static std::uint32_t missing_parts(const Keyframe &keyframe);
     static void decode(Keyframe *keyframe);
-    void push(oc_vehicle_t *vehicle, int id, const Keyframe &keyframe, PacketAssembler *assembler) const;
+    void push(oc_vehicle_t *vehicle, int id, const Keyframe &keyframe, PacketAssembler *assembler);
 
     std::map<int, Keyframe> keyframes_;
+    std::uint64_t n_refused_ = 0;
     std::map<TileKey, TileBlob> tiles_;
 };
 

@@ -57,6 +57,7 @@ json counts_of(Session &session, const ReceiveCounts &received)
     out["suspected"] = model.suspected.size();
     out["tiles"] = session.tiles().size();
     out["requests_given_up"] = session.given_up();
+    out["keyframes_refused"] = session.keyframes_refused();
     out["packets_ill_formed"] = received.ill_formed;
     out["packets_foreign"] = received.foreign;
     out["log_garbage_bytes"] = received.garbage_bytes;

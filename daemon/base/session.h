@@ -66,6 +66,7 @@ public:
     std::uint64_t given_up() const { return n_given_up_; }
     int vehicle() const { return vehicle_; } // -1 before one was heard
     bool is_null_rival() const { return rival_ != nullptr; }
+    std::uint64_t keyframes_refused() const { return rival_ ? rival_->refused() : 0; }
 
 private:
     enum class Phase { kGather, kOverhead, kSettled };

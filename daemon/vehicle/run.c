@@ -241,6 +241,7 @@ static size_t run_next_tile(vehicle_run_t *run)
         if (oc_packet_encode_overhead(&head, &overhead, run->packet, run->config->vehicle.datagram_bytes, &n_bytes) ==
             OC_OK)
             return n_bytes;
+        oc_vehicle_count(run->vehicle, OC_COUNT_REQUESTS_BAD);
     }
     return 0;
 }

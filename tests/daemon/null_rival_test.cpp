@@ -119,5 +119,24 @@ TEST(NullRival, is_a_function_of_the_set_of_pieces)
     }
 }
 
+TEST(NullRival, counts_a_keyframe_that_the_vehicles_code_refuses)
+{
+    FakeVehicle vehicle("two_obstacles", {1, 2}, 40);
+    vehicle.take_frame();
+    vehicle.take_frame();
+    NullRival rival;
+    int refused_view = -1;
+    for (const Packet &packet : pieces_of(vehicle)) {
+        oc_image_piece_t piece = decoded(packet);
+        if (refused_view < 0) refused_view = piece.head.view;
+        if (piece.head.view == refused_view) piece.head.camera_index = 255; // more cameras than a vehicle may have
+        rival.take(piece);
+    }
+    EXPECT_EQ(rival.make_views({}).size(), 1u);
+    EXPECT_EQ(rival.refused(), 1u);
+    EXPECT_EQ(rival.make_views({}).count(refused_view), 0u);
+    EXPECT_EQ(rival.refused(), 1u) << "counted anew, not added up";
+}
+
 } // namespace
 } // namespace outcrop
