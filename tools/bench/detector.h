@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: BSD-3-Clause
+ * Our detector and its rivals behind one face. */
+#ifndef OUTCROP_BENCH_DETECTOR_H
+#define OUTCROP_BENCH_DETECTOR_H
+
+#include "vehicle/judoca.h"
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+namespace outcrop::bench {
+
+/* A junction, or a corner without branches; best first where a detector ranks. */
+struct Found {
+    cv::Point2d at_px;
+    double score;
+    std::vector<double> angle_rad; /* of its branches, as the detector gives them */
+    int kind;                      /* oc_junction_kind_t; OC_KIND_OTHER for corners */
+};
+
+/* JUDOCA for images of one size; sized anew when the size changes. */
+class Judoca {
+public:
+    explicit Judoca(const oc_judoca_params_t &params) : params_(params) {}
+
+    /* std::runtime_error when the detector refuses. */
+    std::vector<Found> find(const cv::Mat &grey);
+
+    const oc_judoca_stats_t &stats() const { return ws_.stats; }
+
+private:
+    void size_for(const cv::Mat &grey);
+
+    oc_judoca_params_t params_;
+    oc_judoca_ws_t ws_{};
+    std::vector<std::uint8_t> memory_;
+    cv::Size size_;
+};
+
+/* Shi-Tomasi corners refined by cornerSubPix, the best `count` at least 5 px apart and margin_px inside. */
+std::vector<Found> find_gftt(const cv::Mat &grey, int count, double margin_px, bool is_refined);
+
+} // namespace outcrop::bench
+#endif

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// outcrop-bench-junctions: accuracy and repeatability of the junction detector beside others.
+#include "accuracy.h"
+#include "random.h"
+
+#include <CLI/CLI.hpp>
+#include <fstream>
+#include <iostream>
+#include <opencv2/core/utility.hpp>
+
+namespace {
+
+using namespace outcrop::bench;
+
+struct Output {
+    std::string json_file;
+
+    void write(const std::string &what, const nlohmann::json &result) const
+    {
+        if (json_file.empty()) return;
+        std::ofstream file(json_file);
+        file << nlohmann::json{{"bench", what}, {"seed", kSeed}, {"result", result}}.dump(1) << '\n';
+        if (!file.flush()) throw std::runtime_error("cannot write " + json_file);
+    }
+};
+
+bool all_met(const std::vector<Verdict> &verdicts)
+{
+    return std::all_of(verdicts.begin(), verdicts.end(), [](const Verdict &verdict) { return verdict.is_met; });
+}
+
+int run_accuracy(AccuracyOptions options, const std::string &set, const Output &output)
+{
+    options.sets =
+        set.empty() ? std::vector<std::string>{"cells", "polys", "chess", "triangles"} : std::vector<std::string>{set};
+    if (options.variances.empty())
+        options.variances = options.is_quick ? std::vector<int>{0, 100} : std::vector<int>{0, 100, 400, 1000};
+    if (options.lambdas.empty())
+        options.lambdas = options.is_quick ? std::vector<int>{10, 15} : std::vector<int>{8, 10, 13, 15, 20};
+    const std::vector<AccuracyRow> rows = measure_accuracy(options);
+    std::cout << "seed " << kSeed << ", blur 0.7 px, match within 2 px and 15 degrees\n" << to_table(rows);
+    output.write("accuracy", to_json(rows));
+    std::size_t n_judged = 0, n_met = 0;
+    bool is_good = true;
+    for (const AccuracyRow &row : rows) {
+        n_judged += row.verdicts.size();
+        n_met += static_cast<std::size_t>(std::count_if(row.verdicts.begin(), row.verdicts.end(),
+                                                        [](const Verdict &verdict) { return verdict.is_met; }));
+        is_good = is_good && all_met(row.verdicts);
+    }
+    std::cout << (options.is_checked ? "gates: " : "targets: ") << n_met << " of " << n_judged << " met\n";
+    return options.is_checked && (!is_good || n_judged == 0) ? 1 : 0;
+}
+
+CLI::App *add_accuracy(CLI::App &app, AccuracyOptions &options, std::string &set)
+{
+    CLI::App *accuracy = app.add_subcommand("accuracy", "place and angle on exact scenes");
+    accuracy->add_option("--set", set, "only this set")->check(CLI::IsMember({"cells", "polys", "chess", "triangles"}));
+    accuracy->add_option("--variance", options.variances, "only these noise variances")->delimiter(',');
+    accuracy->add_option("--lambda", options.lambdas, "only these branch lengths, px")->delimiter(',');
+    accuracy->add_flag("--quick", options.is_quick, "few scenes, variance 0 and 100, lambda 10 and 15");
+    accuracy->add_flag("!--no-rivals", options.has_rivals, "our detector only");
+    accuracy->add_flag("--check", options.is_checked, "judge by the gates; exit 1 unless all hold");
+    accuracy->add_option("--plant-shift", options.damage.shift_px, "move what was found, px");
+    accuracy->add_option("--plant-turn", options.damage.turn_deg, "turn every second branch found, degrees");
+    accuracy->add_option("--plant-drop", options.damage.drop_every, "lose one junction in so many");
+    return accuracy;
+}
+
+} // namespace
+
+int main(int argc, char **argv)
+{
+    CLI::App app("Accuracy and repeatability of the junction detector.", "outcrop-bench-junctions");
+    app.footer("Exit: 0 measured, 1 a gate does not hold or a file cannot be read, 2 wrong usage.");
+    app.require_subcommand(1);
+    app.fallthrough();
+    Output output;
+    app.add_option("--json", output.json_file, "write the figures to this file");
+    AccuracyOptions accuracy_options;
+    std::string set;
+    const CLI::App *accuracy = add_accuracy(app, accuracy_options, set);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError &e) {
+        return app.exit(e) == 0 ? 0 : 2;
+    }
+    cv::setNumThreads(1);
+    try {
+        if (accuracy->parsed()) return run_accuracy(accuracy_options, set, output);
+    } catch (const std::exception &e) {
+        std::cerr << "outcrop-bench-junctions: " << e.what() << '\n';
+        return 1;
+    }
+    return 0;
+}
