@@ -28,7 +28,7 @@ struct Picture {
 /* Each pixel is the true picture convolved with the blur and with the pixel's own square, CV_32F.
  *
  * Coverage of cells of a quarter pixel is exact, the blur is summed over these cells: an edge is where it is
- * said to be within 0.001 px (tests/bench holds it to the closed form). */
+ * said to be within 0.002 px (tests/bench holds it to the closed form). */
 cv::Mat render(const Picture &picture);
 
 /* The picture with every vertex moved by a homography; lines stay lines, so nothing is lost. */

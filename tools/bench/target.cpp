@@ -29,7 +29,28 @@ const std::vector<Entry> kTargets = {
     {"triangles", 0, 15, {"sum_error_deg", false, 0.2, 4}}, {"triangles", 0, 20, {"sum_error_deg", false, 0.2, 4}},
 };
 
-const std::vector<Entry> kGates = {};
+const std::vector<Entry> kGates = {
+    {"cells", 0, 10, {"recall", true, 0.98, 0}},
+    {"cells", 0, 10, {"precision", true, 0.97, 0}},
+    {"cells", 0, 10, {"rmse_px", false, 0.15, 0}},
+    {"cells", 0, 10, {"l_bias_size_deg", false, 0.3, 0}},
+    {"cells", 0, 15, {"rmse_px", false, 0.08, 0}},
+    {"cells", 0, 15, {"angle_rmse_deg", false, 0.3, 0}},
+    {"cells", 100, 10, {"recall", true, 0.96, 0}},
+    {"cells", 100, 10, {"precision", true, 0.96, 0}},
+    {"cells", 100, 10, {"rmse_px", false, 0.6, 0}},
+    {"cells", 100, 10, {"angle_rmse_deg", false, 2.6, 0}},
+    {"cells", 100, 15, {"rmse_px", false, 0.5, 0}},
+    {"cells", 100, 15, {"angle_rmse_deg", false, 1.7, 0}},
+    {"polys", 0, 10, {"recall", true, 0.96, 0}},
+    {"polys", 0, 10, {"precision", true, 0.96, 0}},
+    {"chess", 0, 10, {"recall", true, 0.99, 0}},
+    {"chess", 0, 10, {"precision", true, 0.99, 0}},
+    {"chess", 0, 10, {"rmse_px", false, 0.04, 0}},
+    {"chess", 0, 10, {"angle_rmse_deg", false, 0.35, 0}},
+    {"triangles", 0, 10, {"sum_error_deg", false, 1.2, 0}},
+    {"triangles", 0, 15, {"sum_error_deg", false, 0.4, 0}},
+};
 
 std::vector<Target> select(const std::vector<Entry> &entries, const std::string &set, int variance, int lambda_px)
 {
