@@ -40,5 +40,11 @@ private:
 /* Shi-Tomasi corners refined by cornerSubPix, the best `count` at least 5 px apart and margin_px inside. */
 std::vector<Found> find_gftt(const cv::Mat &grey, int count, double margin_px, bool is_refined);
 
+/* Corners strongest first, without branches. */
+std::vector<Found> find_harris(const cv::Mat &grey); /* block 2, k 0.04, the largest within 3 px */
+std::vector<Found> find_fast(const cv::Mat &grey);   /* 9 of 16, threshold 10 */
+std::vector<Found> find_orb(const cv::Mat &grey);    /* up to 2000 over 8 levels */
+std::vector<Found> find_sift(const cv::Mat &grey);   /* one per place, whatever its orientations */
+
 } // namespace outcrop::bench
 #endif

@@ -2,6 +2,7 @@
 // outcrop-bench-junctions: accuracy and repeatability of the junction detector beside others.
 #include "accuracy.h"
 #include "random.h"
+#include "repeatability.h"
 
 #include <CLI/CLI.hpp>
 #include <fstream>
@@ -24,9 +25,19 @@ struct Output {
     }
 };
 
-bool all_met(const std::vector<Verdict> &verdicts)
+// 0 when all are met.
+template <typename Row>
+int judge_all(const std::vector<Row> &rows, const char *what)
 {
-    return std::all_of(verdicts.begin(), verdicts.end(), [](const Verdict &verdict) { return verdict.is_met; });
+    std::size_t n_met = 0, n_judged = 0;
+    for (const Row &row : rows) {
+        for (const Verdict &verdict : row.verdicts) {
+            n_judged++;
+            n_met += verdict.is_met ? 1 : 0;
+        }
+    }
+    std::cout << what << ": " << n_met << " of " << n_judged << " met\n";
+    return n_met == n_judged && n_judged > 0 ? 0 : 1;
 }
 
 int run_accuracy(AccuracyOptions options, const std::string &set, const Output &output)
@@ -40,16 +51,18 @@ int run_accuracy(AccuracyOptions options, const std::string &set, const Output &
     const std::vector<AccuracyRow> rows = measure_accuracy(options);
     std::cout << "seed " << kSeed << ", blur 0.7 px, match within 2 px and 15 degrees\n" << to_table(rows);
     output.write("accuracy", to_json(rows));
-    std::size_t n_judged = 0, n_met = 0;
-    bool is_good = true;
-    for (const AccuracyRow &row : rows) {
-        n_judged += row.verdicts.size();
-        n_met += static_cast<std::size_t>(std::count_if(row.verdicts.begin(), row.verdicts.end(),
-                                                        [](const Verdict &verdict) { return verdict.is_met; }));
-        is_good = is_good && all_met(row.verdicts);
-    }
-    std::cout << (options.is_checked ? "gates: " : "targets: ") << n_met << " of " << n_judged << " met\n";
-    return options.is_checked && (!is_good || n_judged == 0) ? 1 : 0;
+    const int status = judge_all(rows, options.is_checked ? "gates" : "targets");
+    return options.is_checked ? status : 0;
+}
+
+int run_repeatability(const RepeatabilityOptions &options, const Output &output)
+{
+    const Repeatability result = measure_repeatability(options);
+    std::cout << "seed " << kSeed << ", match within 2 px\n" << to_table(result);
+    if (options.natural.empty()) std::cout << "SKIPPED: natural pictures, no --natural given\n";
+    output.write("repeatability", to_json(result));
+    judge_all(result.rows, "targets");
+    return 0;
 }
 
 CLI::App *add_accuracy(CLI::App &app, AccuracyOptions &options, std::string &set)
@@ -67,6 +80,16 @@ CLI::App *add_accuracy(CLI::App &app, AccuracyOptions &options, std::string &set
     return accuracy;
 }
 
+CLI::App *add_repeatability(CLI::App &app, RepeatabilityOptions &options)
+{
+    CLI::App *repeatability = app.add_subcommand("repeatability", "share of points found again in another view");
+    repeatability->add_option("--natural", options.natural, "list of crops with natural texture")
+        ->check(CLI::ExistingFile);
+    repeatability->add_option("--sites", options.sites, "folder of sites; may be repeated, first found is used");
+    repeatability->add_flag("--quick", options.is_quick, "few scenes");
+    return repeatability;
+}
+
 } // namespace
 
 int main(int argc, char **argv)
@@ -80,6 +103,8 @@ int main(int argc, char **argv)
     AccuracyOptions accuracy_options;
     std::string set;
     const CLI::App *accuracy = add_accuracy(app, accuracy_options, set);
+    RepeatabilityOptions repeatability_options;
+    const CLI::App *repeatability = add_repeatability(app, repeatability_options);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError &e) {
@@ -88,6 +113,7 @@ int main(int argc, char **argv)
     cv::setNumThreads(1);
     try {
         if (accuracy->parsed()) return run_accuracy(accuracy_options, set, output);
+        if (repeatability->parsed()) return run_repeatability(repeatability_options, output);
     } catch (const std::exception &e) {
         std::cerr << "outcrop-bench-junctions: " << e.what() << '\n';
         return 1;

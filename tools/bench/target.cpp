@@ -118,4 +118,13 @@ std::vector<Target> accuracy_gates(const std::string &set, int variance, int lam
     return select(kGates, set, variance, lambda_px);
 }
 
+std::vector<Target> repeatability_targets(const std::string &set, const std::string &warp)
+{
+    static const std::map<std::string, double> natural = {{"rot15", 0.6}, {"scale.75", 0.5}, {"tilt40", 0.55}};
+    if (set == "natural") return {{"repeatability", true, natural.at(warp), 5}};
+    std::vector<Target> targets = {{"lead_over_harris", true, 0.001, 5}};
+    if (warp != "scale.75") targets.push_back({"repeatability", true, 0.95, 5});
+    return targets;
+}
+
 } // namespace outcrop::bench

@@ -36,5 +36,8 @@ std::vector<Target> accuracy_targets(const std::string &set, int variance, int l
 /* What `accuracy --quick --check` demands: looser than the targets and always to be met. */
 std::vector<Target> accuracy_gates(const std::string &set, int variance, int lambda_px);
 
+/* For our detector's share of points found again. */
+std::vector<Target> repeatability_targets(const std::string &set, const std::string &warp);
+
 } // namespace outcrop::bench
 #endif
