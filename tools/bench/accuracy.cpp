@@ -64,24 +64,6 @@ void damage(std::vector<Found> &found, const Damage &damage)
     found = kept;
 }
 
-// ---- the sum of a triangle's angles
-
-// Of the junctions nearest to its corners; false when one is missing or has not two branches.
-bool sum_of_angles(const Scene &scene, const std::vector<Found> &found, double *sum_deg)
-{
-    std::vector<cv::Point2d> truth, at;
-    for (const TrueJunction &junction : scene.junctions) truth.push_back(junction.at_px);
-    for (const Found &junction : found) at.push_back(junction.at_px);
-    const std::vector<Pairing> pairs = pair_points(truth, at, 2 * kMatchPx);
-    *sum_deg = 0;
-    for (const Pairing &pair : pairs) {
-        const std::vector<double> &angle = found[static_cast<std::size_t>(pair.found)].angle_rad;
-        if (angle.size() != 2) return false;
-        *sum_deg += turn_between(angle[0], angle[1]) / kDegree;
-    }
-    return pairs.size() == truth.size();
-}
-
 // ---- one row
 
 using Images = std::vector<cv::Mat>;

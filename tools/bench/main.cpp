@@ -3,6 +3,7 @@
 #include "accuracy.h"
 #include "random.h"
 #include "repeatability.h"
+#include "thesis.h"
 
 #include <CLI/CLI.hpp>
 #include <fstream>
@@ -65,6 +66,37 @@ int run_repeatability(const RepeatabilityOptions &options, const Output &output)
     return 0;
 }
 
+struct ThesisOptions {
+    std::string figure;
+    std::vector<std::filesystem::path> sites;
+};
+
+int run_thesis(const ThesisOptions &options, const Output &output)
+{
+    nlohmann::json result;
+    const auto is_wanted = [&](const char *figure) { return options.figure.empty() || options.figure == figure; };
+    if (is_wanted("3.2")) result["noise"] = thesis_noise();
+    if (is_wanted("3.5")) result["triangle"] = thesis_triangle();
+    if (is_wanted("3.6")) result["chess"] = thesis_chess();
+    if (is_wanted("3.10")) result["lines"] = thesis_lines(options.sites);
+    std::cout << "seed " << kSeed << '\n';
+    for (auto &[name, part] : result.items()) {
+        std::cout << part.at("text").get<std::string>() << '\n';
+        part.erase("text");
+    }
+    output.write("thesis", result);
+    return 0;
+}
+
+int run_chess_stereo(const std::filesystem::path &folder, const Output &output)
+{
+    nlohmann::json result = chess_stereo(folder);
+    std::cout << result.at("text").get<std::string>();
+    result.erase("text");
+    output.write("chess-stereo", result);
+    return 0;
+}
+
 CLI::App *add_accuracy(CLI::App &app, AccuracyOptions &options, std::string &set)
 {
     CLI::App *accuracy = app.add_subcommand("accuracy", "place and angle on exact scenes");
@@ -90,6 +122,22 @@ CLI::App *add_repeatability(CLI::App &app, RepeatabilityOptions &options)
     return repeatability;
 }
 
+CLI::App *add_thesis(CLI::App &app, ThesisOptions &options)
+{
+    CLI::App *thesis = app.add_subcommand("thesis", "the experiments of thesis 3.4, as printed and with ours");
+    thesis->add_option("--figure", options.figure, "only this one; 3.2 is 3.3 as well")
+        ->check(CLI::IsMember({"3.2", "3.5", "3.6", "3.10"}));
+    thesis->add_option("--sites", options.sites, "folder of sites with cubes in it, for 3.10; may be repeated");
+    return thesis;
+}
+
+CLI::App *add_chess_stereo(CLI::App &app, std::filesystem::path &folder)
+{
+    CLI::App *chess = app.add_subcommand("chess-stereo", "photographed chessboards");
+    chess->add_option("--real", folder, "folder with cameras.json and images/")->required();
+    return chess;
+}
+
 } // namespace
 
 int main(int argc, char **argv)
@@ -105,6 +153,10 @@ int main(int argc, char **argv)
     const CLI::App *accuracy = add_accuracy(app, accuracy_options, set);
     RepeatabilityOptions repeatability_options;
     const CLI::App *repeatability = add_repeatability(app, repeatability_options);
+    ThesisOptions thesis_options;
+    const CLI::App *thesis = add_thesis(app, thesis_options);
+    std::filesystem::path real;
+    const CLI::App *chess = add_chess_stereo(app, real);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError &e) {
@@ -114,6 +166,8 @@ int main(int argc, char **argv)
     try {
         if (accuracy->parsed()) return run_accuracy(accuracy_options, set, output);
         if (repeatability->parsed()) return run_repeatability(repeatability_options, output);
+        if (thesis->parsed()) return run_thesis(thesis_options, output);
+        if (chess->parsed()) return run_chess_stereo(real, output);
     } catch (const std::exception &e) {
         std::cerr << "outcrop-bench-junctions: " << e.what() << '\n';
         return 1;

@@ -127,6 +127,21 @@ std::map<std::string, double> Tally::figures() const
     return figures;
 }
 
+bool sum_of_angles(const Scene &scene, const std::vector<Found> &found, double *sum_deg)
+{
+    std::vector<cv::Point2d> truth, at;
+    for (const TrueJunction &junction : scene.junctions) truth.push_back(junction.at_px);
+    for (const Found &junction : found) at.push_back(junction.at_px);
+    const std::vector<Pairing> pairs = pair_points(truth, at, 2 * kMatchPx);
+    *sum_deg = 0;
+    for (const Pairing &pair : pairs) {
+        const std::vector<double> &angle = found[static_cast<std::size_t>(pair.found)].angle_rad;
+        if (angle.size() != 2) return false;
+        *sum_deg += turn_between(angle[0], angle[1]) / kDegree;
+    }
+    return pairs.size() == truth.size();
+}
+
 double mean_of(const std::vector<double> &values)
 {
     double sum = 0;

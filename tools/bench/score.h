@@ -46,6 +46,10 @@ private:
 /* oc_junction_kind_of the true branches. */
 int true_kind(const TrueJunction &truth);
 
+/* Of a triangle's corners as found, each the nearest within 2 kMatchPx; false when one is missing or has not two
+ * branches. */
+bool sum_of_angles(const Scene &scene, const std::vector<Found> &found, double *sum_deg);
+
 double mean_of(const std::vector<double> &values);
 double rms_of(const std::vector<double> &values);
 double deviation_of(const std::vector<double> &values); /* n - 1 below */
