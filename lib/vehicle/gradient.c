@@ -1,12 +1,25 @@
 /* SPDX-License-Identifier: BSD-3-Clause
- * Gaussian derivative, magnitude, and the edge maps B and B+. */
+ * Gaussian derivative and the edge maps B and B+, row by row in one pass. */
 #include "vehicle/gradient.h"
 
 #include <math.h>
 #include <string.h>
 
-/* Filtered rows alive at a time (above, here, below) and one for the vertical pass. */
-#define ROWS 4u
+/* Elements before the first pixel of a scratch row: the replicated border. */
+#define LEAD 16u
+static_assert(LEAD > OC_GRADIENT_MAX_RADIUS, "the border holds a kernel's arm and one more");
+
+/* Scratch rows: 1 after the vertical pass, 3 filtered, 3 of magnitudes, 2 of
+ * dx and 2 of dy, and one of dx, dy pairs for the noise. */
+enum {
+    ROW_DOWN,
+    ROW_FILTERED,
+    ROW_MAGNITUDE = ROW_FILTERED + 3,
+    ROW_DX = ROW_MAGNITUDE + 3,
+    ROW_DY = ROW_DX + 2,
+    ROW_PAIRS = ROW_DY + 2,
+    N_ROWS = ROW_PAIRS + 2
+};
 
 /* Bins of the magnitude histogram, 1/64 grey level per px each. */
 #define NOISE_BINS 2048u
@@ -17,10 +30,15 @@ static bool gradient_size_is_valid(uint32_t width_px, uint32_t height_px)
            height_px <= OC_MAX_IMAGE_SIDE;
 }
 
-/* A filtered row carries the replicated border on both sides. */
+/* A scratch row carries the border on both sides and whole words of pixels. */
 static size_t gradient_row_length(uint32_t width_px)
 {
-    return (size_t)width_px + 2u * (OC_GRADIENT_MAX_RADIUS + 1u);
+    return 64u * oc_bitmap_columns(width_px) + 2u * LEAD;
+}
+
+static int16_t *gradient_row(const oc_gradient_t *gradient, uint32_t row)
+{
+    return gradient->row + row * gradient_row_length(gradient->width_px) + LEAD;
 }
 
 /* Integer kernel whose 2 r + 1 weights sum to exactly 256, so that a constant
@@ -46,17 +64,30 @@ static void gradient_build_kernel(oc_gradient_t *gradient, float sigma_px)
     gradient->kernel[0] = (uint16_t)rest;
 }
 
+typedef struct gradient_pieces {
+    size_t dxdy, map, row, word; /* bytes */
+} gradient_pieces_t;
+
+static gradient_pieces_t gradient_measure(uint32_t width_px, uint32_t height_px)
+{
+    return (gradient_pieces_t){
+        .dxdy = (size_t)width_px * height_px * 2u * sizeof(int16_t),
+        .map = oc_bitmap_words(width_px, height_px) * sizeof(uint64_t),
+        .row = N_ROWS * gradient_row_length(width_px) * sizeof(int16_t),
+        .word = 2u * (size_t)oc_bitmap_columns(width_px) * sizeof(uint64_t),
+    };
+}
+
 size_t oc_gradient_size_bytes(uint32_t width_px, uint32_t height_px)
 {
     if (!gradient_size_is_valid(width_px, height_px)) return 0;
 
-    const size_t area = (size_t)width_px * height_px;
-    return 3u * oc_arena_cost(area * sizeof(uint16_t)) + oc_arena_cost(area) +
-           oc_arena_cost(ROWS * gradient_row_length(width_px) * sizeof(uint16_t));
+    const gradient_pieces_t p = gradient_measure(width_px, height_px);
+    return oc_arena_cost(p.dxdy) + 2u * oc_arena_cost(p.map) + oc_arena_cost(p.row) + oc_arena_cost(p.word);
 }
 
 oc_status_t oc_gradient_init(oc_gradient_t *gradient, oc_arena_t *arena, uint32_t width_px, uint32_t height_px,
-                             float sigma_px)
+                             float sigma_px, oc_simd_t simd)
 {
     OC_ASSERT(gradient && arena);
 
@@ -65,10 +96,9 @@ oc_status_t oc_gradient_init(oc_gradient_t *gradient, oc_arena_t *arena, uint32_
         return OC_E_ARG;
     }
 
-    const size_t area = (size_t)width_px * height_px;
-    const size_t row_bytes = ROWS * gradient_row_length(width_px) * sizeof(uint16_t);
+    const gradient_pieces_t p = gradient_measure(width_px, height_px);
+    const size_t bytes[5] = {p.dxdy, p.map, p.map, p.row, p.word};
     void *piece[5];
-    const size_t bytes[5] = {area * sizeof(int16_t), area * sizeof(int16_t), area * sizeof(uint16_t), area, row_bytes};
     for (uint32_t i = 0; i < 5; i++) {
         const oc_status_t status = oc_arena_take(arena, bytes[i], &piece[i]);
         if (status != OC_OK) return status;
@@ -77,11 +107,13 @@ oc_status_t oc_gradient_init(oc_gradient_t *gradient, oc_arena_t *arena, uint32_
     memset(gradient, 0, sizeof *gradient);
     gradient->width_px = width_px;
     gradient->height_px = height_px;
-    gradient->dx = piece[0];
-    gradient->dy = piece[1];
-    gradient->magnitude = piece[2];
-    gradient->edge = piece[3];
-    gradient->row = piece[4];
+    gradient->kernels = oc_kernels_get(simd);
+    gradient->dxdy = piece[0];
+    gradient->pitch = oc_bitmap_pitch(height_px);
+    gradient->thick = piece[1];
+    gradient->thin = piece[2];
+    gradient->row = piece[3];
+    gradient->word = piece[4];
     gradient_build_kernel(gradient, sigma_px);
     return OC_OK;
 }
@@ -93,96 +125,86 @@ static const uint8_t *gradient_image_row(const oc_image_t *grey, int32_t y)
     return grey->px + (size_t)clamped * grey->stride_bytes;
 }
 
-/* Vertical pass of image row y into out[0 .. width), units of 1/256 level.
- * Exact: 255 * 256 fits 16 bits. */
-static void gradient_filter_down(const oc_gradient_t *gradient, const oc_image_t *grey, int32_t y,
-                                 uint16_t *restrict out)
+/* Filtered row y (which may lie outside the image) with one replicated pixel at each end. */
+static void gradient_filter(const oc_gradient_t *gradient, const oc_image_t *grey, int32_t y, int16_t *out)
 {
     const uint32_t width = gradient->width_px;
-    const uint8_t *mid = gradient_image_row(grey, y);
-    const uint16_t centre = gradient->kernel[0];
-    for (uint32_t x = 0; x < width; x++) out[x] = (uint16_t)(mid[x] * centre);
+    const int32_t radius = gradient->radius;
+    const uint8_t *rows[2 * OC_GRADIENT_MAX_RADIUS + 1];
+    for (int32_t i = -radius; i <= radius; i++) rows[i + radius] = gradient_image_row(grey, y + i);
 
-    for (int32_t i = 1; i <= gradient->radius; i++) {
-        const uint8_t *above = gradient_image_row(grey, y - i);
-        const uint8_t *below = gradient_image_row(grey, y + i);
-        const uint16_t w = gradient->kernel[i];
-        for (uint32_t x = 0; x < width; x++) {
-            out[x] = (uint16_t)(out[x] + (uint16_t)((uint16_t)(above[x] + below[x]) * w));
+    uint16_t *down = (uint16_t *)gradient_row(gradient, ROW_DOWN);
+    gradient->kernels->down(rows, gradient->kernel, radius, width, down);
+    for (int32_t i = 1; i <= radius; i++) {
+        down[-i] = down[0];
+        down[width - 1u + (uint32_t)i] = down[width - 1u];
+    }
+    gradient->kernels->across(down, gradient->kernel, radius, width, out);
+    out[-1] = out[0];
+    out[width] = out[width - 1u];
+}
+
+static bool gradient_takes(const oc_gradient_t *gradient, const oc_image_t *grey)
+{
+    return oc_image_is_valid(grey) && grey->channels == 1 && grey->width_px == gradient->width_px &&
+           grey->height_px == gradient->height_px;
+}
+
+/* Maps of row y, whose magnitudes and those of the rows beside it are ready. */
+static void gradient_map_row(oc_gradient_t *gradient, uint32_t y, int16_t threshold)
+{
+    const uint32_t width = gradient->width_px, n = oc_bitmap_columns(width);
+    uint64_t *thick = gradient->word, *thin = gradient->word + n;
+    gradient->kernels->thin(
+        gradient_row(gradient, ROW_MAGNITUDE + (y + 2u) % 3u), gradient_row(gradient, ROW_MAGNITUDE + y % 3u),
+        gradient_row(gradient, ROW_MAGNITUDE + (y + 1u) % 3u), gradient_row(gradient, ROW_DX + y % 2u),
+        gradient_row(gradient, ROW_DY + y % 2u), width, threshold, thick, thin);
+    for (uint32_t c = 0; c < n; c++) {
+        uint64_t inside = ~(uint64_t)0;
+        if (c == 0) inside <<= 2;
+        if (64u * c + 64u > width - 2u) {
+            const uint32_t rest = width - 2u > 64u * c ? width - 2u - 64u * c : 0;
+            inside &= ((uint64_t)1 << rest) - 1u;
         }
+        const size_t at = oc_bitmap_at(gradient->pitch, c, y);
+        gradient->thick[at] = thick[c] & inside;
+        gradient->thin[at] = thin[c] & inside;
+        gradient->n_thin += (uint32_t)__builtin_popcountll(thin[c] & inside);
     }
 }
 
-static void gradient_replicate_ends(uint16_t *row, uint32_t width)
+static int16_t gradient_threshold(float t_b)
 {
-    for (uint32_t i = 1; i <= OC_GRADIENT_MAX_RADIUS + 1u; i++) {
-        *(row - i) = row[0];
-        row[width - 1u + i] = row[width - 1u];
-    }
+    const float scaled = t_b * (float)OC_GRADIENT_ONE;
+    if (!(scaled < (float)INT16_MAX)) return INT16_MAX;
+    return scaled > 1.0f ? (int16_t)lrintf(scaled) : 1;
 }
 
-/* Horizontal pass, in[-r .. width + r) to out[0 .. width). Each product is cut
- * to 16 bits, at most r / 256 of a level too dark, the same everywhere. */
-static void gradient_filter_across(const oc_gradient_t *gradient, const uint16_t *restrict in, uint16_t *restrict out)
+oc_status_t oc_gradient_compute(oc_gradient_t *gradient, const oc_image_t *grey, float t_b)
 {
-    const uint32_t width = gradient->width_px;
-    const uint32_t centre = gradient->kernel[0];
-    for (uint32_t x = 0; x < width; x++) out[x] = (uint16_t)((in[x] * centre) >> 8);
+    OC_ASSERT(gradient && gradient->dxdy && grey);
 
-    for (int32_t i = 1; i <= gradient->radius; i++) {
-        const uint32_t w = gradient->kernel[i];
-        const uint16_t *left = in - i;
-        const uint16_t *right = in + i;
-        for (uint32_t x = 0; x < width; x++) {
-            out[x] = (uint16_t)(out[x] + ((left[x] * w) >> 8) + ((right[x] * w) >> 8));
-        }
-    }
-}
+    if (!gradient_takes(gradient, grey)) return OC_E_ARG;
 
-static void gradient_differ(const oc_gradient_t *gradient, uint32_t y, const uint16_t *above, const uint16_t *here,
-                            const uint16_t *below)
-{
-    const uint32_t width = gradient->width_px;
-    int16_t *restrict dx = gradient->dx + (size_t)y * width;
-    int16_t *restrict dy = gradient->dy + (size_t)y * width;
-    uint16_t *restrict magnitude = gradient->magnitude + (size_t)y * width;
-    for (uint32_t x = 0; x < width; x++) {
-        const uint16_t *left = here - 1;
-        dx[x] = (int16_t)((here[x + 1] >> 1) - (left[x] >> 1));
-        dy[x] = (int16_t)((below[x] >> 1) - (above[x] >> 1));
-    }
-    for (uint32_t x = 0; x < width; x++) {
-        const float gx = dx[x];
-        const float gy = dy[x];
-        magnitude[x] = (uint16_t)(int32_t)(sqrtf(gx * gx + gy * gy) + 0.5f);
-    }
-}
-
-oc_status_t oc_gradient_compute(oc_gradient_t *gradient, const oc_image_t *grey)
-{
-    OC_ASSERT(gradient && gradient->dx && grey);
-
-    if (!oc_image_is_valid(grey) || grey->channels != 1) return OC_E_ARG;
-    if (grey->width_px != gradient->width_px || grey->height_px != gradient->height_px) {
-        return OC_E_ARG;
-    }
-
-    const uint32_t width = gradient->width_px;
-    const size_t pitch = gradient_row_length(width);
-    uint16_t *first = gradient->row + OC_GRADIENT_MAX_RADIUS + 1;
-    uint16_t *down = first + 3u * pitch;
-    uint16_t *filtered[3] = {first, first + pitch, first + 2u * pitch};
     const int32_t height = (int32_t)gradient->height_px;
+    const uint32_t width = gradient->width_px;
+    const int16_t threshold = gradient_threshold(t_b);
+    int16_t *filtered[3];
+    for (uint32_t i = 0; i < 3; i++) filtered[i] = gradient_row(gradient, ROW_FILTERED + i);
 
-    /* Row y needs filtered rows y - 1 .. y + 1; one step behind the filter. */
+    /* Row y of the filter completes the derivative of y - 1 and the maps of
+     * y - 2. The first and last two rows of the maps stay empty. */
+    gradient->n_thin = 0;
     for (int32_t y = -1; y <= height; y++) {
-        uint16_t *newest = filtered[2];
-        gradient_filter_down(gradient, grey, y, down);
-        gradient_replicate_ends(down, width);
-        gradient_filter_across(gradient, down, newest);
-        gradient_replicate_ends(newest, width);
+        int16_t *newest = filtered[2];
+        gradient_filter(gradient, grey, y, newest);
         if (y >= 1) {
-            gradient_differ(gradient, (uint32_t)(y - 1), filtered[0], filtered[1], newest);
+            const uint32_t at = (uint32_t)(y - 1);
+            gradient->kernels->differ(filtered[0], filtered[1], newest, width, gradient->dxdy + 2u * (size_t)at * width,
+                                      gradient_row(gradient, ROW_DX + at % 2u),
+                                      gradient_row(gradient, ROW_DY + at % 2u),
+                                      gradient_row(gradient, ROW_MAGNITUDE + at % 3u));
+            if (at >= 3u && at + 1u < (uint32_t)height) gradient_map_row(gradient, at - 1u, threshold);
         }
         filtered[2] = filtered[0];
         filtered[0] = filtered[1];
@@ -191,77 +213,39 @@ oc_status_t oc_gradient_compute(oc_gradient_t *gradient, const oc_image_t *grey)
     return OC_OK;
 }
 
-float oc_gradient_noise(const oc_gradient_t *gradient)
+/* Add one row's magnitudes to the histogram. */
+static void noise_count_row(const oc_gradient_t *gradient, const oc_image_t *grey, uint32_t y, uint32_t histogram[])
 {
-    OC_ASSERT(gradient && gradient->magnitude);
-
-    uint32_t histogram[NOISE_BINS] = {0};
-    const size_t area = (size_t)gradient->width_px * gradient->height_px;
-    for (size_t i = 0; i < area; i++) {
-        const uint32_t bin = gradient->magnitude[i] >> 2;
+    int16_t *filtered[3];
+    for (uint32_t i = 0; i < 3; i++) {
+        filtered[i] = gradient_row(gradient, ROW_FILTERED + i);
+        gradient_filter(gradient, grey, (int32_t)(y + i) - 1, filtered[i]);
+    }
+    int16_t *magnitude = gradient_row(gradient, ROW_MAGNITUDE);
+    gradient->kernels->differ(filtered[0], filtered[1], filtered[2], gradient->width_px,
+                              gradient_row(gradient, ROW_PAIRS), gradient_row(gradient, ROW_DX),
+                              gradient_row(gradient, ROW_DY), magnitude);
+    for (uint32_t x = 0; x < gradient->width_px; x++) {
+        const uint32_t bin = (uint32_t)magnitude[x] >> 2;
         histogram[bin < NOISE_BINS ? bin : NOISE_BINS - 1u]++;
     }
+}
 
-    size_t below = 0;
-    uint32_t bin = 0;
-    while (bin < NOISE_BINS - 1u && below + histogram[bin] < (area + 1) / 2) {
-        below += histogram[bin++];
+oc_status_t oc_gradient_noise(oc_gradient_t *gradient, const oc_image_t *grey, float *noise)
+{
+    OC_ASSERT(gradient && gradient->dxdy && grey && noise);
+
+    if (!gradient_takes(gradient, grey)) return OC_E_ARG;
+
+    uint32_t histogram[NOISE_BINS] = {0};
+    uint32_t n = 0;
+    for (uint32_t y = OC_GRADIENT_NOISE_STEP / 2u; y < gradient->height_px; y += OC_GRADIENT_NOISE_STEP) {
+        noise_count_row(gradient, grey, y, histogram);
+        n += gradient->width_px;
     }
+    uint32_t below = 0, bin = 0;
+    while (bin < NOISE_BINS - 1u && below + histogram[bin] < (n + 1u) / 2u) below += histogram[bin++];
     /* Median of a Rayleigh variable = 1.1774 sd of one component. */
-    return ((float)bin + 0.5f) * 4.0f / ((float)OC_GRADIENT_ONE * 1.1774f);
-}
-
-/* Offset in reading order of the neighbour that lies along the gradient. */
-static int32_t gradient_neighbour(int32_t dx, int32_t dy, int32_t pitch)
-{
-    const int32_t ax = dx < 0 ? -dx : dx;
-    const int32_t ay = dy < 0 ? -dy : dy;
-    /* tan(22.5 deg) = 53 / 128 within 0.04 deg. */
-    if (128 * ay <= 53 * ax) return 1;
-    if (128 * ax < 53 * ay) return pitch;
-    return (dx < 0) == (dy < 0) ? pitch + 1 : pitch - 1;
-}
-
-uint32_t oc_gradient_edges(oc_gradient_t *gradient, float t_b)
-{
-    OC_ASSERT(gradient && gradient->edge);
-
-    const uint32_t width = gradient->width_px;
-    const float scaled = t_b * (float)OC_GRADIENT_ONE;
-    uint16_t threshold = UINT16_MAX;
-    if (scaled < (float)UINT16_MAX) threshold = scaled > 1.0f ? (uint16_t)lrintf(scaled) : 1u;
-
-    uint32_t n_thin = 0;
-    memset(gradient->edge, 0, (size_t)width * gradient->height_px);
-    for (uint32_t y = 2; y + 2 < gradient->height_px; y++) {
-        const size_t row = (size_t)y * width;
-        for (uint32_t x = 2; x + 2 < width; x++) {
-            const uint16_t *m = gradient->magnitude + row + x;
-            if (*m < threshold) continue;
-
-            const int32_t step = gradient_neighbour(gradient->dx[row + x], gradient->dy[row + x], (int32_t)width);
-            const bool thin = *m > *(m - step) && *m >= *(m + step);
-            gradient->edge[row + x] = thin ? OC_EDGE_THICK | OC_EDGE_THIN : OC_EDGE_THICK;
-            n_thin += thin;
-        }
-    }
-    return n_thin;
-}
-
-/* Sector within a quarter turn, 0..4, of a direction with ax, ay >= 0. The
- * borders are tan 11.25, 33.75, 56.25 and 78.75 degrees in 1/1024. */
-static uint32_t gradient_quarter_sector(int32_t ax, int32_t ay)
-{
-    if (1024 * ay < 204 * ax) return 0;
-    if (1024 * ay < 684 * ax) return 1;
-    if (684 * ay < 1024 * ax) return 2;
-    if (204 * ay < 1024 * ax) return 3;
-    return 4;
-}
-
-uint32_t oc_gradient_sector(int32_t dx, int32_t dy)
-{
-    const uint32_t s = dx == 0 && dy == 0 ? 0 : gradient_quarter_sector(dx < 0 ? -dx : dx, dy < 0 ? -dy : dy);
-    if (dx >= 0) return dy >= 0 ? s : (16u - s) & 15u;
-    return dy >= 0 ? 8u - s : 8u + s;
+    *noise = ((float)bin + 0.5f) * 4.0f / ((float)OC_GRADIENT_ONE * 1.1774f);
+    return OC_OK;
 }

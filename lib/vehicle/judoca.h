@@ -12,18 +12,16 @@
 #include "core/status.h"
 #include "vehicle/arena.h"
 #include "vehicle/gradient.h"
+#include "vehicle/judoca_search.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-/* Largest branch length; sizes the ray tables and the margin of the maps. */
+/* Largest branch length. */
 #define OC_JUDOCA_MAX_LAMBDA_PX 24
 
-/* Directions looked at from one pixel: the pixels of a circle of that radius. */
-#define OC_JUDOCA_MAX_RAYS 192u
-
-/* Places fitted per image at most; 4 bytes each. */
+/* Places fitted per image at most. */
 #define OC_JUDOCA_MAX_CANDIDATES 262144u
 
 /* Fits kept per image before the nearest duplicates are dropped; 96 bytes each. */
@@ -43,8 +41,7 @@ typedef struct oc_judoca_params {
     float t_b_noise_k;       /* when t_b is 0: t_b = k * oc_gradient_noise(), kept within
                         * [OC_JUDOCA_MIN_T_B, OC_JUDOCA_MAX_T_B]; 1..20; 5 */
     float s_j;               /* least share of a branch that lies on an edge (thesis s_J), 0.3..1; 0.6 */
-    int32_t lambda_px;       /* longest branch (thesis lambda), 6..OC_JUDOCA_MAX_LAMBDA_PX; 10. Acute
-                        * pairs are followed further, by what blur spoils near their tip */
+    int32_t lambda_px;       /* longest branch (thesis lambda), 6..OC_JUDOCA_MAX_LAMBDA_PX; 10 */
     int32_t lambda_min_px;   /* shortest branch, 4..lambda_px; 6. lambda_px = all of one length */
     float min_angle_rad;     /* two branches closer than this are one, 0.1..1; 0.26 */
     float min_bend_rad;      /* a pair this near to pi is a line, not a corner, 0.05..1; 0.26 */
@@ -57,6 +54,7 @@ typedef struct oc_judoca_params {
     uint32_t spread_cell_px; /* side of the cells that share max_junctions when it
                               * binds, 8..4096; 40 */
     oc_judoca_method_t method;
+    oc_simd_t simd; /* instruction set; OC_SIMD_AUTO. All give the same junctions */
 } oc_judoca_params_t;
 
 /* Bounds of a threshold taken from the noise, grey levels per px. */
@@ -73,23 +71,13 @@ typedef struct oc_judoca_stats {
     uint32_t n_dropped; /* junctions lost to max_junctions or cap */
 } oc_judoca_stats_t;
 
-/* One ray: from the centre to a pixel of the circle. */
-typedef struct oc_judoca_ray {
-    uint8_t n;         /* samples, from the circle inwards */
-    uint8_t n_needed;  /* of these on B+ for strength s_j */
-    uint16_t bit;      /* of the oriented map: gradient on the left of the ray */
-    uint16_t bit_back; /* the same edge with the opposite gradient */
-    float ux, uy;      /* unit vector */
-    float per_hit;     /* share of its samples, half of one */
-    float angle_rad;
-    int32_t offset[OC_JUDOCA_MAX_LAMBDA_PX]; /* into a padded map */
-} oc_judoca_ray_t;
-
 /* A junction waiting for its place in the answer. */
 typedef struct oc_judoca_rank {
     float key;      /* larger first */
     uint32_t index; /* into found; the smaller wins a tie */
 } oc_judoca_rank_t;
+
+struct oc_judoca_thesis;
 
 /* Tables and maps for one image size. In the header only so that callers can
  * place it; read `stats` and `gradient` after a call, nothing else. */
@@ -97,18 +85,14 @@ typedef struct oc_judoca_ws {
     oc_judoca_params_t params;
     oc_judoca_stats_t stats;
     oc_gradient_t gradient; /* of the last image */
-    float cos_min_angle;
-    uint32_t n_rays;
-    oc_judoca_ray_t *ray;
-    int32_t map_border;     /* zeros around the padded maps, px */
-    int32_t map_pitch;      /* elements per row of the padded maps */
-    uint32_t *oriented;     /* one bit per gradient direction: low half B+ grown across the
-                             * edge, high half B+ itself */
-    uint16_t *prescore;     /* strength of the place in 1/65535, 0 = no junction */
-    uint32_t *place;        /* [max_candidates] index into prescore of a place to fit */
-    oc_junction_t *found;   /* [OC_JUDOCA_MAX_FOUND] */
-    oc_judoca_rank_t *rank; /* [OC_JUDOCA_MAX_FOUND] */
-    uint16_t *cell;         /* junctions met per spread cell */
+    oc_search_t search;
+    uint64_t *done;                  /* bitmap: apices that have been fitted */
+    oc_junction_t *found;            /* [OC_JUDOCA_MAX_FOUND] */
+    oc_judoca_rank_t *rank;          /* [OC_JUDOCA_MAX_FOUND] */
+    uint16_t *next;                  /* [OC_JUDOCA_MAX_FOUND] list of the junctions in one square of the owner map */
+    uint16_t *owner;                 /* first junction of each square, + 1 */
+    uint16_t *cell;                  /* junctions met per spread cell */
+    struct oc_judoca_thesis *thesis; /* the literal method's tables, NULL with the other */
 } oc_judoca_ws_t;
 
 /* Defaults tuned for repeatability across views 20 to 40 degrees apart. */
@@ -143,7 +127,7 @@ OC_CHECKED oc_status_t oc_judoca_init(oc_judoca_ws_t *ws, oc_arena_t *arena, uin
  * count 0. The same image gives the same answer, bit for bit, whatever its
  * stride and whatever was detected before.
  *
- * O(width * height * rays) in the worst case, about 5 % of it on photographs. */
+ * O(width * height) and O(max_candidates); figures in docs/measurements.md. */
 OC_CHECKED oc_status_t oc_judoca_detect(oc_judoca_ws_t *ws, const oc_image_t *grey, oc_junction_t out[], uint32_t cap,
                                         uint32_t *count);
 

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "vehicle/judoca_fit.h"
-#include "vehicle/judoca_select.h"
 
 /* Bits of the padded map. Grown means: here or one pixel aside, up/down for
  * flat rays, left/right for steep ones. */
@@ -22,40 +21,143 @@
 
 #define PI 3.14159265358979f
 
+/* Prescores are at most this (9 sums of 7001). */
+#define MAX_SUM 63009u
+#define SUM_BINS 1024u
+
+/* Directions looked at from one pixel: the pixels of a circle of the largest radius. */
+#define MAX_RAYS 192u
+
+#define FIRST_SAMPLE_PX 2
+
+/* One ray: from the centre to a pixel of the circle. */
+typedef struct thesis_ray {
+    uint8_t n;        /* samples, from the circle inwards */
+    uint8_t n_needed; /* of these on B+ for strength s_j */
+    bool is_flat;
+    float angle_rad;
+    int32_t offset[OC_JUDOCA_MAX_LAMBDA_PX]; /* into a padded map */
+} thesis_ray_t;
+
+typedef struct oc_judoca_thesis {
+    uint32_t n_rays;
+    thesis_ray_t ray[MAX_RAYS];
+    int32_t border, pitch; /* of the padded maps: no ray leaves them */
+    uint8_t *map;
+    uint16_t *prescore; /* strength of the place in 1/7000, 0 = no junction */
+    uint32_t *place;    /* [max_candidates] index into prescore of a place to report */
+} oc_judoca_thesis_t;
+
+static size_t thesis_area(uint32_t width_px, uint32_t height_px, const oc_judoca_params_t *params)
+{
+    const size_t border = (size_t)params->lambda_px + 3u;
+    return (width_px + 2u * border) * (height_px + 2u * border);
+}
+
+size_t oc_judoca_thesis_size_bytes(uint32_t width_px, uint32_t height_px, const oc_judoca_params_t *params)
+{
+    const size_t area = thesis_area(width_px, height_px, params);
+    return oc_arena_cost(sizeof(oc_judoca_thesis_t)) + oc_arena_cost(area) + oc_arena_cost(area * sizeof(uint16_t)) +
+           oc_arena_cost(params->max_candidates * sizeof(uint32_t));
+}
+
+/* ---- tables ---- */
+
+static void ray_fill(thesis_ray_t *ray, int32_t x, int32_t y, float s_j, int32_t pitch)
+{
+    const float length = sqrtf((float)(x * x + y * y));
+    const int32_t ax = x < 0 ? -x : x, ay = y < 0 ? -y : y, steps = ax > ay ? ax : ay;
+
+    memset(ray, 0, sizeof *ray);
+    ray->angle_rad = oc_judoca_angle((float)x, (float)y);
+    ray->is_flat = ax >= ay;
+    for (int32_t i = steps; i > 0; i--) {
+        const float part = (float)i / (float)steps;
+        if (part * length < (float)FIRST_SAMPLE_PX - 0.5f) break;
+        const int32_t dx = (int32_t)lrintf((float)x * part);
+        const int32_t dy = (int32_t)lrintf((float)y * part);
+        ray->offset[ray->n++] = dy * pitch + dx;
+    }
+    ray->n_needed = (uint8_t)ceilf(s_j * (float)ray->n - 1e-4f);
+}
+
+/* All pixels whose distance rounds to the radius, in order of angle. */
+static void thesis_build_rays(oc_judoca_thesis_t *t, int32_t radius, float s_j)
+{
+    for (int32_t y = -radius; y <= radius; y++) {
+        for (int32_t x = -radius; x <= radius; x++) {
+            const float r = sqrtf((float)(x * x + y * y));
+            if (lrintf(r) != radius || t->n_rays == MAX_RAYS) continue;
+
+            thesis_ray_t made;
+            ray_fill(&made, x, y, s_j, t->pitch);
+            uint32_t at = t->n_rays++;
+            for (; at > 0 && t->ray[at - 1].angle_rad > made.angle_rad; at--) t->ray[at] = t->ray[at - 1];
+            t->ray[at] = made;
+        }
+    }
+}
+
+oc_status_t oc_judoca_thesis_init(oc_judoca_ws_t *ws, oc_arena_t *arena)
+{
+    OC_ASSERT(ws && arena);
+
+    const oc_judoca_params_t *params = &ws->params;
+    const uint32_t width = ws->gradient.width_px, height = ws->gradient.height_px;
+    const size_t area = thesis_area(width, height, params);
+    const size_t bytes[4] = {sizeof(oc_judoca_thesis_t), area, area * sizeof(uint16_t),
+                             params->max_candidates * sizeof(uint32_t)};
+    void *piece[4];
+    for (uint32_t i = 0; i < 4; i++) {
+        const oc_status_t status = oc_arena_take(arena, bytes[i], &piece[i]);
+        if (status != OC_OK) return status;
+    }
+    oc_judoca_thesis_t *t = piece[0];
+    t->map = piece[1];
+    t->prescore = piece[2];
+    t->place = piece[3];
+    t->border = params->lambda_px + 3;
+    t->pitch = (int32_t)width + 2 * t->border;
+    thesis_build_rays(t, params->lambda_px, params->s_j);
+    ws->thesis = t;
+    return OC_OK;
+}
+
+/* ---- map ---- */
+
 static void thesis_map(oc_judoca_ws_t *ws)
 {
     const oc_gradient_t *g = &ws->gradient;
-    const int32_t pitch = ws->map_pitch;
-    const size_t rows = g->height_px + 2u * (size_t)ws->map_border;
-    memset(ws->oriented, 0, rows * (size_t)pitch * sizeof ws->oriented[0]);
+    const oc_judoca_thesis_t *t = ws->thesis;
+    const int32_t pitch = t->pitch;
+    memset(t->map, 0, thesis_area(g->width_px, g->height_px, &ws->params));
 
     for (uint32_t y = 0; y < g->height_px; y++) {
-        uint32_t *map = ws->oriented + ((int32_t)y + ws->map_border) * pitch + ws->map_border;
+        uint8_t *map = t->map + ((int32_t)y + t->border) * pitch + t->border;
         for (uint32_t x = 0; x < g->width_px; x++) {
-            const uint32_t edge = g->edge[(size_t)y * g->width_px + x];
-            if (edge == 0) continue;
+            const size_t word = oc_bitmap_at(g->pitch, x / 64u, y);
+            if (!(g->thick[word] >> x % 64u & 1u)) continue;
 
-            const bool thin = (edge & OC_EDGE_THIN) != 0;
-            const uint32_t flat = thin ? THICK_FLAT | THIN_FLAT : THICK_FLAT;
-            const uint32_t steep = thin ? THICK_STEEP | THIN_STEEP : THICK_STEEP;
-            uint32_t *at = map + x;
-            *at |= flat | steep | THICK | (thin ? THIN : 0);
-            *(at - pitch) |= flat;
-            *(at + pitch) |= flat;
-            *(at - 1) |= steep;
-            *(at + 1) |= steep;
+            const bool thin = g->thin[word] >> x % 64u & 1u;
+            const uint8_t flat = thin ? THICK_FLAT | THIN_FLAT : THICK_FLAT;
+            const uint8_t steep = thin ? THICK_STEEP | THIN_STEEP : THICK_STEEP;
+            uint8_t *at = map + x;
+            at[0] |= (uint8_t)(flat | steep | THICK | (thin ? THIN : 0u));
+            at[-pitch] |= flat;
+            at[pitch] |= flat;
+            at[-1] |= steep;
+            at[1] |= steep;
         }
     }
 }
 
 /* Strength of the branch to one pixel of the circle, 0 when there is none. */
-static float thesis_ray_strength(const oc_judoca_ray_t *ray, const uint32_t *centre)
+static float thesis_ray_strength(const thesis_ray_t *ray, const uint8_t *centre)
 {
     if (!(centre[ray->offset[0]] & THIN)) return 0.0f;
 
-    const bool flat = fabsf(cosf(ray->angle_rad)) >= fabsf(sinf(ray->angle_rad));
-    const uint32_t path = flat ? THICK_FLAT : THICK_STEEP;
-    const uint32_t ridge = flat ? THIN_FLAT : THIN_STEEP;
+    const uint32_t path = ray->is_flat ? THICK_FLAT : THICK_STEEP;
+    const uint32_t ridge = ray->is_flat ? THIN_FLAT : THIN_STEEP;
     uint32_t on_ridge = 0;
     for (uint32_t i = 0; i < ray->n; i++) {
         const uint32_t here = centre[ray->offset[i]];
@@ -73,14 +175,15 @@ static float thesis_between(float a, float b)
 
 /* Branches at a place; neighbouring anchor points within the least angle
  * count once, as the strongest of them. */
-static uint32_t thesis_branches(const oc_judoca_ws_t *ws, const uint32_t *centre, oc_branch_t branch[OC_MAX_BRANCHES])
+static uint32_t thesis_branches(const oc_judoca_ws_t *ws, const uint8_t *centre, oc_branch_t branch[OC_MAX_BRANCHES])
 {
+    const oc_judoca_thesis_t *t = ws->thesis;
     uint32_t n = 0;
-    for (uint32_t i = 0; i < ws->n_rays; i++) {
-        const float strength = thesis_ray_strength(&ws->ray[i], centre);
+    for (uint32_t i = 0; i < t->n_rays; i++) {
+        const float strength = thesis_ray_strength(&t->ray[i], centre);
         if (strength <= 0.0f) continue;
 
-        const float angle = ws->ray[i].angle_rad;
+        const float angle = t->ray[i].angle_rad;
         uint32_t same = 0;
         while (same < n && thesis_between(branch[same].angle_rad, angle) >= ws->params.min_angle_rad) {
             same++;
@@ -109,38 +212,103 @@ static float thesis_strength(const oc_judoca_ws_t *ws, const oc_branch_t branch[
 static void thesis_prescore(oc_judoca_ws_t *ws)
 {
     const oc_gradient_t *g = &ws->gradient;
-    const size_t rows = g->height_px + 2u * (size_t)ws->map_border;
-    memset(ws->prescore, 0, rows * (size_t)ws->map_pitch * sizeof ws->prescore[0]);
+    const oc_judoca_thesis_t *t = ws->thesis;
+    memset(t->prescore, 0, thesis_area(g->width_px, g->height_px, &ws->params) * sizeof t->prescore[0]);
 
     for (uint32_t y = 0; y < g->height_px; y++) {
-        const int32_t start = ((int32_t)y + ws->map_border) * ws->map_pitch + ws->map_border;
+        const int32_t start = ((int32_t)y + t->border) * t->pitch + t->border;
         for (uint32_t x = 0; x < g->width_px; x++) {
-            const uint32_t *centre = ws->oriented + start + x;
+            const uint8_t *centre = t->map + start + x;
             if (!(*centre & THICK)) continue;
 
             oc_branch_t branch[OC_MAX_BRANCHES];
             const uint32_t n = thesis_branches(ws, centre, branch);
             const float strength = thesis_strength(ws, branch, n);
-            if (strength > 0.0f) ws->prescore[start + (int32_t)x] = (uint16_t)(strength * 7000.0f);
+            if (strength > 0.0f) t->prescore[start + (int32_t)x] = (uint16_t)(strength * 7000.0f);
         }
     }
 }
 
+/* ---- choice ---- */
+
+/* Sum over 3x3: the middle of a cluster of strong places beats its rim. */
+static uint32_t place_sum(const uint16_t *at, int32_t pitch)
+{
+    uint32_t sum = 0;
+    for (int32_t dy = -1; dy <= 1; dy++) {
+        const uint16_t *row = at + dy * pitch;
+        sum += (uint32_t)row[-1] + row[0] + row[1];
+    }
+    return sum;
+}
+
+/* The first in reading order wins a tie. */
+static bool place_is_peak(const uint16_t *at, int32_t pitch, int32_t radius, uint32_t sum)
+{
+    for (int32_t dy = -radius; dy <= radius; dy++) {
+        for (int32_t dx = -radius; dx <= radius; dx++) {
+            const uint16_t *other = at + dy * pitch + dx;
+            if (other == at || *other == 0) continue;
+            const uint32_t theirs = place_sum(other, pitch);
+            if (theirs > sum || (theirs == sum && other < at)) return false;
+        }
+    }
+    return true;
+}
+
+/* Visit every place that qualifies; count it per bin, or store it when its bin is high enough. */
+static uint32_t place_scan(oc_judoca_ws_t *ws, int32_t radius, uint32_t histogram[], uint32_t lowest_bin, uint32_t cap)
+{
+    const oc_judoca_thesis_t *t = ws->thesis;
+    const int32_t pitch = t->pitch;
+    uint32_t n = 0;
+    for (uint32_t y = 0; y < ws->gradient.height_px; y++) {
+        const int32_t start = ((int32_t)y + t->border) * pitch + t->border;
+        for (uint32_t x = 0; x < ws->gradient.width_px; x++) {
+            const uint16_t *at = t->prescore + start + x;
+            if (*at == 0) continue;
+            const uint32_t sum = radius > 0 ? place_sum(at, pitch) : 9u * *at;
+            const uint32_t bin = sum * (SUM_BINS - 1u) / MAX_SUM;
+            if (bin < lowest_bin || !place_is_peak(at, pitch, radius, sum)) continue;
+            if (histogram) histogram[bin]++;
+            if (!histogram && n < cap) t->place[n] = (uint32_t)start + x;
+            n++;
+        }
+    }
+    return n < cap ? n : cap;
+}
+
+/* Places with a prescore into place[], in reading order, at most max_candidates: the best ones, of each
+ * neighbourhood the middle of its strongest cluster. */
+static void thesis_pick(oc_judoca_ws_t *ws, int32_t radius)
+{
+    uint32_t histogram[SUM_BINS] = {0};
+    ws->stats.n_places = place_scan(ws, radius, histogram, 0, UINT32_MAX);
+
+    /* Lowest bin that still fits; a bin that does not is left out whole, so
+     * the choice does not depend on where in the image a place lies. */
+    uint32_t bin = SUM_BINS;
+    uint32_t n = 0;
+    while (bin > 0 && n + histogram[bin - 1] <= ws->params.max_candidates) n += histogram[--bin];
+    ws->stats.n_fitted = place_scan(ws, radius, NULL, bin, ws->params.max_candidates);
+}
+
 void oc_judoca_thesis_find(oc_judoca_ws_t *ws)
 {
-    OC_ASSERT(ws && ws->oriented);
+    OC_ASSERT(ws && ws->thesis);
 
     thesis_map(ws);
     thesis_prescore(ws);
-    oc_judoca_pick(ws, PEAK_RADIUS);
+    thesis_pick(ws, PEAK_RADIUS);
+    const oc_judoca_thesis_t *t = ws->thesis;
     if (ws->stats.n_fitted > OC_JUDOCA_MAX_FOUND) ws->stats.n_fitted = OC_JUDOCA_MAX_FOUND;
     for (uint32_t i = 0; i < ws->stats.n_fitted; i++) {
-        const int32_t at = (int32_t)ws->place[i];
+        const int32_t at = (int32_t)t->place[i];
         oc_junction_t *j = &ws->found[i];
         memset(j, 0, sizeof *j);
-        j->x_px = (float)(at % ws->map_pitch - ws->map_border);
-        j->y_px = (float)(at / ws->map_pitch - ws->map_border);
-        j->n_branches = (uint8_t)thesis_branches(ws, ws->oriented + at, j->branch);
+        j->x_px = (float)(at % t->pitch - t->border);
+        j->y_px = (float)(at / t->pitch - t->border);
+        j->n_branches = (uint8_t)thesis_branches(ws, t->map + at, j->branch);
         j->score = thesis_strength(ws, j->branch, j->n_branches);
         oc_judoca_sort_branches(j);
         oc_judoca_set_kind(j, ws->params.min_bend_rad);

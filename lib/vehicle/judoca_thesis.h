@@ -9,7 +9,13 @@
 extern "C" {
 #endif
 
-/* Fill ws->found and stats.n_peaks, n_fitted, n_found from the edge map: rays
+/* Bytes that oc_judoca_thesis_init takes from the arena. */
+size_t oc_judoca_thesis_size_bytes(uint32_t width_px, uint32_t height_px, const oc_judoca_params_t *params);
+
+/* Tables and maps of this method into ws->thesis; ws->gradient and ws->params are set. */
+OC_CHECKED oc_status_t oc_judoca_thesis_init(oc_judoca_ws_t *ws, oc_arena_t *arena);
+
+/* Fill ws->found and stats.n_places, n_fitted, n_found from the edge maps: rays
  * of length lambda_px from every pixel of B to the B+ pixels of the circle,
  * joined by a path of B, strength = share of B+ within one pixel; the apex is
  * the pixel, the angles are those of the chords. Of a cluster of equal

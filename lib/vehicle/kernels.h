@@ -1,0 +1,126 @@
+/* SPDX-License-Identifier: BSD-3-Clause
+ * The loops that take the detector's time, compiled for several instruction sets and once more without any vectors.
+ * All give the same bits: integers, IEEE square roots, sums in one fixed order. */
+#ifndef OUTCROP_VEHICLE_KERNELS_H
+#define OUTCROP_VEHICLE_KERNELS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum oc_simd {
+    OC_SIMD_AUTO = 0,   /* the best that this processor has */
+    OC_SIMD_SCALAR = 1, /* plain C, the twin that the others are held against */
+    OC_SIMD_BASE = 2,   /* what every processor of the target has: SSE2, NEON */
+    OC_SIMD_AVX2 = 3
+} oc_simd_t;
+
+/* Half width of the largest Gaussian. */
+#define OC_GRADIENT_MAX_RADIUS 9
+
+/* Directions of the ray search: multiples of a 32nd turn, y down. */
+#define OC_RAYS 32u
+
+/* Samples of one ray, from the circle inwards to FIRST_SAMPLE. */
+#define OC_RAY_MAX_SAMPLES 8u
+
+/* The rays: pixels of a small circle and the way there, relative to the centre. */
+typedef struct oc_ray_table {
+    uint32_t n_samples;                     /* of every ray */
+    uint32_t n_spare;                       /* samples that may miss, 0..3 */
+    int8_t dx[OC_RAYS][OC_RAY_MAX_SAMPLES]; /* [0] is on the circle */
+    int8_t dy[OC_RAYS][OC_RAY_MAX_SAMPLES];
+} oc_ray_table_t;
+
+/* What four rows of 64 pixels see. Ray r = direction d with the gradient on
+ * its left (r = d) or on its right (r = OC_RAYS + d). */
+typedef struct oc_ray_block {
+    uint64_t ray[2u * OC_RAYS][4]; /* pixels whose ray holds */
+    uint64_t weak[4];              /* pixels with two rays that are neither equal nor opposite */
+    uint64_t strong[4];            /* the same of rays without a miss */
+} oc_ray_block_t;
+
+/* Samples of one branch; OC_FIT_SAMPLES is a multiple of every vector length. */
+#define OC_FIT_SAMPLES 32u
+#define OC_FIT_MAX_REACH 2
+
+/* One branch seen along its major axis, so that x and y share the code. */
+typedef struct oc_fit_walk {
+    const int16_t *dxdy;
+    int32_t step_major, step_minor; /* pixels, into the planes */
+    int32_t n_minor;                /* image size across */
+    int32_t first, sign;            /* first major coordinate and its step */
+    uint32_t n;                     /* samples to take, all inside the image along the major axis */
+    float a_major, a_minor;         /* apex */
+    float slope;                    /* minor per major */
+    float nx, ny;                   /* unit normal on the side of the gradient */
+    float own_major, own_minor;     /* unit vector along the branch */
+    bool has_model;                 /* branches end at the apex: level the ridge */
+    float floor;                    /* least derivative of an edge point */
+    int32_t reach;                  /* half width of the search across, 0..OC_FIT_MAX_REACH */
+} oc_fit_walk_t;
+
+/* What another branch adds to this one's derivative near the apex: the
+ * Gaussian ridge of a half line from the apex. */
+typedef struct oc_fit_rival {
+    float ux, uy;    /* along the rival */
+    float amplitude; /* of its ridge in this branch's derivative, signed */
+} oc_fit_rival_t;
+
+typedef struct oc_fit_profile {
+    float across[OC_FIT_SAMPLES];  /* minor coordinate of the ridge less the line's, px of the minor axis */
+    float value[OC_FIT_SAMPLES];   /* derivative there */
+    float bend[OC_FIT_SAMPLES];    /* 2 value - before - after */
+    int32_t found[OC_FIT_SAMPLES]; /* 0 no edge, 1 an edge that does not say where, 2 a position */
+} oc_fit_profile_t;
+
+typedef struct oc_kernels {
+    oc_simd_t level;
+
+    /* Gaussian down the columns: rows[0 .. 2 radius] are image rows, out in 1/128 grey level. */
+    void (*down)(const uint8_t *const rows[], const uint16_t kernel[], int32_t radius, uint32_t width, uint16_t *out);
+
+    /* Gaussian along the row, in[-radius .. width + radius). */
+    void (*across)(const uint16_t *in, const uint16_t kernel[], int32_t radius, uint32_t width, int16_t *out);
+
+    /* Central differences of filtered rows (here[-1 .. width]) and their magnitude, at most INT16_MAX. */
+    void (*differ)(const int16_t *above, const int16_t *here, const int16_t *below, uint32_t width, int16_t *dxdy,
+                   int16_t *dx, int16_t *dy, int16_t *magnitude);
+
+    /* B and B+ of a row from three rows of magnitudes, each with a zero before
+     * it and zeros up to a multiple of 64 behind it; one word per 64 pixels. */
+    void (*thin)(const int16_t *above, const int16_t *here, const int16_t *below, const int16_t *dx, const int16_t *dy,
+                 uint32_t width, int16_t threshold, uint64_t thick[], uint64_t thin[]);
+
+    /* OR of each direction's plane with the two to each side: n words each, n a multiple of 4. */
+    void (*spread)(const uint64_t *const from[OC_RAYS], uint64_t *const to[OC_RAYS], uint32_t n);
+
+    /* Rays of the pixels set in wanted[4]. mid[d] is the block's first row in
+     * the plane of edges whose gradient points along d, left[d] and right[d]
+     * the same in the columns beside it; planes not set in live are empty. */
+    void (*rays)(const oc_ray_table_t *table, const uint64_t *const left[OC_RAYS], const uint64_t *const mid[OC_RAYS],
+                 const uint64_t *const right[OC_RAYS], uint32_t live, const uint64_t wanted[4], oc_ray_block_t *block);
+
+    /* Ridge positions along a branch, what the rivals add taken off. s2 is the
+     * square of the ridge's Gaussian width along the minor axis, px; inv_s one
+     * over its width in px across the edge, inv_st along it. */
+    void (*profile)(const oc_fit_walk_t *walk, const oc_fit_rival_t rivals[], uint32_t n_rivals, float s2, float inv_s,
+                    float inv_st, oc_fit_profile_t *out);
+} oc_kernels_t;
+
+/* The kernels of a level, or of the best below it that this processor has. */
+const oc_kernels_t *oc_kernels_get(oc_simd_t level);
+
+extern const oc_kernels_t oc_kernels_scalar;
+extern const oc_kernels_t oc_kernels_base;
+#if defined(__x86_64__)
+extern const oc_kernels_t oc_kernels_avx2;
+#endif
+
+#ifdef __cplusplus
+}
+#endif
+#endif

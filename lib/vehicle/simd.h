@@ -1,0 +1,65 @@
+/* SPDX-License-Identifier: BSD-3-Clause
+ * The few vector operations that C has no word for, each with a plain form of the same result. For the kernels only. */
+#ifndef OUTCROP_VEHICLE_SIMD_H
+#define OUTCROP_VEHICLE_SIMD_H
+
+#include <stdint.h>
+
+#if defined(OC_KERNELS_SCALAR)
+/* The twin uses none. */
+#elif defined(__SSE2__)
+#include <immintrin.h>
+#elif defined(__ARM_NEON)
+#include <arm_neon.h>
+#endif
+
+/* Four bitmap words: 64 pixels of four rows. GCC and clang turn the operators
+ * into whatever the target has. */
+typedef uint64_t oc_words_t __attribute__((vector_size(32)));
+
+static inline int oc_words_any(const oc_words_t *w)
+{
+#if defined(__AVX2__) && !defined(OC_KERNELS_SCALAR)
+    return !_mm256_testz_si256((__m256i)*w, (__m256i)*w);
+#else
+    return (((*w)[0] | (*w)[1]) | ((*w)[2] | (*w)[3])) != 0;
+#endif
+}
+
+/* Bit i = mask[i] is not zero; each mask[i] is 0 or -1. */
+static inline uint64_t oc_bits_of_masks(const int16_t mask[64])
+{
+#if defined(__AVX2__) && !defined(OC_KERNELS_SCALAR)
+    uint64_t bits = 0;
+    for (int half = 0; half < 2; half++) {
+        const __m256i a = _mm256_loadu_si256((const __m256i *)(const void *)(mask + 32 * half));
+        const __m256i b = _mm256_loadu_si256((const __m256i *)(const void *)(mask + 32 * half + 16));
+        const __m256i packed = _mm256_permute4x64_epi64(_mm256_packs_epi16(a, b), 0xd8);
+        bits |= (uint64_t)(uint32_t)_mm256_movemask_epi8(packed) << (32 * half);
+    }
+    return bits;
+#elif defined(__SSE2__) && !defined(OC_KERNELS_SCALAR)
+    uint64_t bits = 0;
+    for (int part = 0; part < 4; part++) {
+        const __m128i a = _mm_loadu_si128((const __m128i *)(const void *)(mask + 16 * part));
+        const __m128i b = _mm_loadu_si128((const __m128i *)(const void *)(mask + 16 * part + 8));
+        bits |= (uint64_t)(uint32_t)_mm_movemask_epi8(_mm_packs_epi16(a, b)) << (16 * part);
+    }
+    return bits;
+#elif defined(__ARM_NEON) && defined(__aarch64__) && !defined(OC_KERNELS_SCALAR)
+    static const uint8_t weight[8] = {1, 2, 4, 8, 16, 32, 64, 128};
+    const uint8x8_t weights = vld1_u8(weight);
+    uint64_t bits = 0;
+    for (int part = 0; part < 8; part++) {
+        const uint8x8_t bytes = vmovn_u16(vreinterpretq_u16_s16(vld1q_s16(mask + 8 * part)));
+        bits |= (uint64_t)vaddv_u8(vand_u8(bytes, weights)) << (8 * part);
+    }
+    return bits;
+#else
+    uint64_t bits = 0;
+    for (int i = 0; i < 64; i++) bits |= (uint64_t)(mask[i] != 0) << i;
+    return bits;
+#endif
+}
+
+#endif
