@@ -9,6 +9,9 @@
 #include "vehicle/judoca_select.h"
 #include "vehicle/judoca_thesis.h"
 
+/* The first look's directions are rough: it calls a line only what bends less than this share of min_bend_rad. */
+#define FIRST_BEND_SHARE 0.7
+
 oc_judoca_params_t oc_judoca_defaults(void)
 {
     return (oc_judoca_params_t){
@@ -190,6 +193,32 @@ static uint32_t places_lowest(const oc_judoca_ws_t *ws, uint32_t n)
     return bin << 6;
 }
 
+static bool is_in_image(const oc_gradient_t *gradient, float x, float y)
+{
+    return x >= 0.0f && y >= 0.0f && x < (float)gradient->width_px && y < (float)gradient->height_px;
+}
+
+/* Has an apex in this pixel been fitted before? It has now. */
+static bool done_test_and_set(const oc_judoca_ws_t *ws, float x, float y)
+{
+    uint64_t *word = &ws->done[oc_bitmap_at(ws->gradient.pitch, (uint32_t)x / 64u, (uint32_t)y)];
+    const uint64_t bit = (uint64_t)1 << (uint32_t)x % 64u;
+    const bool is_done = (*word & bit) != 0;
+    *word |= bit;
+    return is_done;
+}
+
+/* What leads to the pixel of a junction or one beside it would find it again. */
+static void done_surround(const oc_judoca_ws_t *ws, float x_px, float y_px)
+{
+    for (int32_t dy = -1; dy <= 1; dy++) {
+        for (int32_t dx = -1; dx <= 1; dx++) {
+            const float x = x_px + 0.5f + (float)dx, y = y_px + 0.5f + (float)dy;
+            if (is_in_image(&ws->gradient, x, y)) (void)done_test_and_set(ws, x, y);
+        }
+    }
+}
+
 /* Fit from one place. Places around one corner lead to one apex, which is
  * fitted once. */
 static bool fit_place(oc_judoca_ws_t *ws, const oc_fit_rules_t *rules, const oc_place_t *place)
@@ -201,14 +230,12 @@ static bool fit_place(oc_judoca_ws_t *ws, const oc_fit_rules_t *rules, const oc_
     if (n < 2 || !oc_judoca_fit_begin(&ws->gradient, rules, place->x, place->y, seed, n, &fit)) return false;
 
     const float x = fit.x_px + 0.5f, y = fit.y_px + 0.5f;
-    if (!(x >= 0.0f && y >= 0.0f && x < (float)ws->gradient.width_px && y < (float)ws->gradient.height_px)) {
-        return false;
-    }
-    uint64_t *done = &ws->done[oc_bitmap_at(ws->gradient.pitch, (uint32_t)x / 64u, (uint32_t)y)];
-    const uint64_t bit = (uint64_t)1 << (uint32_t)x % 64u;
-    if (*done & bit) return false;
-    *done |= bit;
-    return oc_judoca_fit_finish(&ws->gradient, rules, &fit, &ws->found[ws->stats.n_found]);
+    if (!is_in_image(&ws->gradient, x, y)) return false;
+    if (done_test_and_set(ws, x, y)) return false;
+    oc_junction_t *junction = &ws->found[ws->stats.n_found];
+    if (!oc_judoca_fit_finish(&ws->gradient, rules, &fit, junction)) return false;
+    done_surround(ws, junction->x_px, junction->y_px);
+    return true;
 }
 
 static void fit_places(oc_judoca_ws_t *ws)
@@ -222,6 +249,7 @@ static void fit_places(oc_judoca_ws_t *ws)
                                   .cos_min_angle = (float)cos((double)p->min_angle_rad),
                                   .cos_min_bend = (float)cos((double)p->min_bend_rad),
                                   .min_bend_rad = p->min_bend_rad,
+                                  .cos_first_bend = (float)cos(FIRST_BEND_SHARE * (double)p->min_bend_rad),
                                   .max_rms_px = p->max_rms_px,
                                   .max_apex_sigma_px = p->max_apex_sigma_px};
     const oc_gradient_t *g = &ws->gradient;

@@ -20,7 +20,7 @@
 
 /* Fits after the first look, at most; another is done while the apex moves by more than SETTLED_PX. */
 #define PASSES 4u
-#define SETTLED_PX 0.02f
+#define SETTLED_PX 0.05f
 
 /* First look: nearer to the apex than INNER + ACUTE cot(angle to the nearest
  * branch) the ridges of an acute pair have run into each other. */
@@ -73,6 +73,17 @@
 
 /* Contrast at which the score reaches one half, grey levels per px. */
 #define HALF_CONTRAST 6.0f
+
+/* libm's take NaN into account and are calls. */
+static inline float larger(float a, float b)
+{
+    return a > b ? a : b;
+}
+
+static inline float smaller(float a, float b)
+{
+    return a < b ? a : b;
+}
 
 /* How far a pass looks across and along a branch. */
 typedef struct fit_reach {
@@ -233,7 +244,7 @@ static bool branch_solve(oc_fit_branch_t *branch, const fit_prefix_t *prefix, ui
     branch->turn_rad = (s->w * s->wtd - s->wt * s->wd) / det;
     const float sse = s->wdd - branch->offset_px * s->wd - branch->turn_rad * s->wtd;
     const float spare = n > 2 ? (float)(n - 2u) : 1.0f;
-    branch->rms_px = sqrtf(fmaxf(sse, 0.0f) / s->w * (float)n / spare);
+    branch->rms_px = sqrtf(larger(sse, 0.0f) / s->w * (float)n / spare);
     branch->amplitude = s->value / s->gain2;
     branch->share = prefix->share;
     branch->length_px = prefix->t;
@@ -247,7 +258,7 @@ static bool branch_follow(const oc_gradient_t *gradient, const oc_fit_rules_t *r
 {
     oc_fit_walk_t walk =
         walk_make(gradient, rules, fit, branch, span->inner_px,
-                  fmaxf(reach->longest_px + span->inner_px - reach->inner_px, span->shortest_px), reach->across_px);
+                  larger(reach->longest_px + span->inner_px - reach->inner_px, span->shortest_px), reach->across_px);
     if (walk.n < MIN_SAMPLES) return false;
     walk.has_model = reach->has_model;
 
@@ -265,7 +276,7 @@ static bool branch_follow(const oc_gradient_t *gradient, const oc_fit_rules_t *r
     if (n_short < MIN_SAMPLES) n_short = MIN_SAMPLES;
 
     for (uint32_t n = n_all; n >= n_short; n = n > n_short + 2 ? (n + n_short) / 2 : n - 1) {
-        if (prefix[n - 1].t < fminf(reach->shortest_px - 1.5f, LEAST_LENGTH * reach->shortest_px)) return false;
+        if (prefix[n - 1].t < smaller(reach->shortest_px - 1.5f, LEAST_LENGTH * reach->shortest_px)) return false;
         if (!branch_solve(branch, &prefix[n - 1], n)) return false;
         const float limit = n > n_short ? GROW_RMS_PX : rules->max_rms_px;
         if (branch->rms_px <= limit && branch->share >= rules->s_j) {
@@ -309,7 +320,7 @@ static float fit_pooled(const oc_fit_t *fit)
         sum += rms * rms * spare;
         n += spare;
     }
-    return sum / fmaxf(n, 1.0f);
+    return sum / larger(n, 1.0f);
 }
 
 /* The apex that all lines agree on best. A branch counts by how well its own
@@ -337,7 +348,7 @@ static bool fit_intersect(oc_fit_t *fit, float move[2])
     move[0] = (c * d - b * e) / det;
     move[1] = (a * e - b * d) / det;
     /* Smaller eigenvalue of the information, without cancellation. */
-    const float root = sqrtf(fmaxf(half * half - det, 0.0f));
+    const float root = sqrtf(larger(half * half - det, 0.0f));
     fit->sigma_px = sqrtf((half + root) / det);
     return true;
 }
@@ -383,7 +394,7 @@ static void fit_measure_blur(oc_fit_t *fit, float sigma_px)
     float sum = 0.0f, n = 0.0f;
     for (uint32_t i = 0; i < fit->n; i++) {
         const oc_fit_branch_t *b = &fit->branch[i];
-        const float major2 = fmaxf(b->ux * b->ux, b->uy * b->uy);
+        const float major2 = larger(b->ux * b->ux, b->uy * b->uy);
         const float q = 0.5f * b->sums.bend / b->sums.level;
         if (!(b->sums.level > 0.0f && q > 0.02f && q < 0.6f)) continue;
         sum += b->sums.level * major2 / (2.0f * (q + q * q * (0.5f + q * (1.0f / 3.0f + 0.25f * q))));
@@ -391,7 +402,7 @@ static void fit_measure_blur(oc_fit_t *fit, float sigma_px)
     }
     if (!(n > 0.0f)) return;
     const float base = sigma_px * sigma_px;
-    fit->blur_px2 = fminf(fmaxf(sum / n, base + MIN_BLUR_PX2), base + MAX_BLUR_PX2);
+    fit->blur_px2 = smaller(larger(sum / n, base + MIN_BLUR_PX2), base + MAX_BLUR_PX2);
 }
 
 static float fit_acute_cot(const oc_fit_t *fit, uint32_t self)
@@ -400,7 +411,7 @@ static float fit_acute_cot(const oc_fit_t *fit, uint32_t self)
     for (uint32_t i = 0; i < fit->n; i++) {
         if (i == self) continue;
         const float c = fit_cos_between(&fit->branch[i], &fit->branch[self]);
-        cot = fmaxf(cot, c / fmaxf(fit_sin_between(&fit->branch[i], &fit->branch[self]), 0.1f));
+        cot = larger(cot, c / larger(fit_sin_between(&fit->branch[i], &fit->branch[self]), 0.1f));
     }
     return cot;
 }
@@ -411,12 +422,24 @@ static bool fit_is_near(const oc_fit_t *fit)
 {
     float limit_px = 0.0f;
     for (uint32_t i = 0; i < fit->n; i++) {
-        limit_px = fmaxf(limit_px, INNER_PX + 2.0f * ACUTE_PX * fit_acute_cot(fit, i));
+        limit_px = larger(limit_px, INNER_PX + 2.0f * ACUTE_PX * fit_acute_cot(fit, i));
     }
-    limit_px = fminf(limit_px, 6.0f) + 2.0f + BLUNT_PX;
+    limit_px = smaller(limit_px, 6.0f) + 2.0f + BLUNT_PX;
     const float dx = fit->x_px - fit->from_x_px;
     const float dy = fit->y_px - fit->from_y_px;
     return dx * dx + dy * dy <= limit_px * limit_px;
+}
+
+/* Two branches that are neither one nor a line. */
+static bool fit_bends(const oc_fit_t *fit, float cos_min_angle, float cos_min_bend)
+{
+    for (uint32_t i = 1; i < fit->n; i++) {
+        for (uint32_t j = 0; j < i; j++) {
+            const float c = fit_cos_between(&fit->branch[i], &fit->branch[j]);
+            if (c <= cos_min_angle && c >= -cos_min_bend) return true;
+        }
+    }
+    return false;
 }
 
 /* Once round: follow all branches from the apex, then move the apex. */
@@ -426,14 +449,14 @@ static bool fit_pass(const oc_gradient_t *gradient, const oc_fit_rules_t *rules,
     oc_fit_t next = *fit;
     next.n = 0;
     for (uint32_t i = 0; i < fit->n; i++) {
-        const float acute_px = fminf(ACUTE_PX * fit_acute_cot(fit, i), ACUTE_MAX_PX);
+        const float acute_px = smaller(ACUTE_PX * fit_acute_cot(fit, i), ACUTE_MAX_PX);
         fit_span_t span = {reach->inner_px, reach->inner_px + acute_px, 0.0f};
         if (reach->across_px > 0) span.inner_px = span.crowded_px;
-        span.shortest_px = fmaxf(reach->shortest_px, span.inner_px + SPAN_PX);
+        span.shortest_px = larger(reach->shortest_px, span.inner_px + SPAN_PX);
         oc_fit_branch_t branch = fit->branch[i];
         bool holds = branch_follow(gradient, rules, fit, i, reach, &span, &branch);
         if (!holds && span.inner_px > reach->inner_px + 0.5f) {
-            span = (fit_span_t){reach->inner_px, span.crowded_px, fmaxf(reach->shortest_px, reach->inner_px + SPAN_PX)};
+            span = (fit_span_t){reach->inner_px, span.crowded_px, larger(reach->shortest_px, reach->inner_px + SPAN_PX)};
             branch = fit->branch[i];
             holds = branch_follow(gradient, rules, fit, i, reach, &span, &branch);
         }
@@ -449,7 +472,7 @@ static bool fit_pass(const oc_gradient_t *gradient, const oc_fit_rules_t *rules,
     *moved_px = sqrtf(move[0] * move[0] + move[1] * move[1]);
     *fit = next;
     fit_measure_blur(fit, rules->sigma_px);
-    return fit_is_near(fit);
+    return fit_is_near(fit) && fit_bends(fit, rules->cos_min_angle, reach->has_model ? rules->cos_min_bend : rules->cos_first_bend);
 }
 
 bool oc_judoca_fit_begin(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, float x_px, float y_px,
@@ -467,7 +490,7 @@ bool oc_judoca_fit_begin(const oc_gradient_t *gradient, const oc_fit_rules_t *ru
         fit->branch[i].uy = seed[i].uy;
         fit->branch[i].side = seed[i].side;
     }
-    const float shortest_px = fminf(rules->lambda_min_px, FIRST_LOOK_PX);
+    const float shortest_px = smaller(rules->lambda_min_px, FIRST_LOOK_PX);
     const fit_reach_t reach = {2, INNER_PX, shortest_px, shortest_px + 1.0f, false};
     return fit_pass(gradient, rules, &reach, fit, &fit->moved_px);
 }
@@ -568,9 +591,9 @@ static float fit_pair_score(const oc_fit_t *fit, uint32_t i, uint32_t j, float c
     const oc_fit_branch_t *a = &fit->branch[i], *b = &fit->branch[j];
     if (fit_cos_between(a, b) < -cos_min_bend) return 0.0f;
 
-    const float contrast = fminf(a->amplitude, b->amplitude) / (float)OC_GRADIENT_ONE;
-    const float share = fminf(a->share, b->share);
-    const float length = fminf(a->length_px, b->length_px);
+    const float contrast = smaller(a->amplitude, b->amplitude) / (float)OC_GRADIENT_ONE;
+    const float share = smaller(a->share, b->share);
+    const float length = smaller(a->length_px, b->length_px);
     return contrast / (contrast + HALF_CONTRAST) * share * fit_sin_between(a, b) * sqrtf(length);
 }
 
@@ -578,7 +601,7 @@ static float fit_score(const oc_fit_t *fit, float cos_min_bend)
 {
     float best = 0.0f;
     for (uint32_t i = 0; i < fit->n; i++) {
-        for (uint32_t j = i + 1; j < fit->n; j++) best = fmaxf(best, fit_pair_score(fit, i, j, cos_min_bend));
+        for (uint32_t j = i + 1; j < fit->n; j++) best = larger(best, fit_pair_score(fit, i, j, cos_min_bend));
     }
     return best / (1.0f + 4.0f * fit->sigma_px);
 }
@@ -635,7 +658,7 @@ static void fit_write(const oc_fit_t *fit, float score, float tolerance_rad, oc_
     for (uint32_t i = 0; i < fit->n && i < OC_MAX_BRANCHES; i++) {
         const oc_fit_branch_t *b = &fit->branch[i];
         junction->branch[junction->n_branches++] =
-            (oc_branch_t){oc_judoca_angle(b->ux, b->uy), b->length_px, fminf(b->share, 1.0f)};
+            (oc_branch_t){oc_judoca_angle(b->ux, b->uy), b->length_px, smaller(b->share, 1.0f)};
     }
     oc_judoca_sort_branches(junction);
     oc_judoca_set_kind(junction, tolerance_rad);
@@ -652,11 +675,11 @@ bool oc_judoca_fit_finish(const oc_gradient_t *gradient, const oc_fit_rules_t *r
             fit_look_round(gradient, rules, RING_FIRST + (int32_t)pass * RING_STEP,
                            RING_LAST + (int32_t)pass * RING_STEP, fit);
         const bool is_whole = length_px >= rules->lambda_px;
-        length_px = fminf(GROWTH * length_px, rules->lambda_px);
+        length_px = smaller(GROWTH * length_px, rules->lambda_px);
         const int32_t across_px = pass == 0  ? (fit->moved_px > AGAIN_PX || fit->sigma_px > VAGUE_PX ? 2 : 1)
                                   : is_whole ? 0
                                              : 1;
-        const fit_reach_t reach = {across_px, MODEL_INNER_PX, fminf(rules->lambda_min_px, length_px), length_px, true};
+        const fit_reach_t reach = {across_px, MODEL_INNER_PX, smaller(rules->lambda_min_px, length_px), length_px, true};
         if (!fit_pass(gradient, rules, &reach, fit, &moved_px)) return false;
         if (is_whole && moved_px <= SETTLED_PX) break;
     }

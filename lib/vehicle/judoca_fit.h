@@ -29,6 +29,7 @@ typedef struct oc_fit_rules {
     float s_j;
     float t_b; /* in force, grey levels per px */
     float cos_min_angle, cos_min_bend, min_bend_rad;
+    float cos_first_bend; /* a line already at the first look */
     float max_rms_px, max_apex_sigma_px;
 } oc_fit_rules_t;
 

@@ -335,7 +335,8 @@ KERNEL_INLINE float step_up(float x)
 /* Derivatives round the expected line: tap k of sample m. */
 typedef struct kernel_taps {
     uint32_t n_lanes;                       /* samples, rounded up to whole vectors */
-    float along[MAX_TAPS][OC_FIT_SAMPLES];  /* dx and dy turned into the branch's frame: along the branch */
+    int32_t pair[MAX_TAPS][OC_FIT_SAMPLES]; /* dx and dy as they lie in memory */
+    float along[MAX_TAPS][OC_FIT_SAMPLES];  /* the same turned into the branch's frame: along the branch */
     float normal[MAX_TAPS][OC_FIT_SAMPLES]; /* across it */
     float major[OC_FIT_SAMPLES];            /* from the apex */
     float centre[OC_FIT_SAMPLES];           /* middle tap from the apex, minor */
@@ -355,24 +356,26 @@ KERNEL_INLINE void taps_take(const oc_fit_walk_t *walk, kernel_taps_t *taps, con
         const int32_t is_inside = centre - half >= 0 && centre + half < walk->n_minor;
         centre = is_inside ? centre : half;
         const int16_t *at = walk->dxdy + 2 * (major * walk->step_major + (centre - half) * walk->step_minor);
-        for (int32_t k = 0; k < n_taps; k++, at += 2 * walk->step_minor) {
-            taps->along[k][m] = at[0];
-            taps->normal[k][m] = at[1];
-        }
+        for (int32_t k = 0; k < n_taps; k++, at += 2 * walk->step_minor) memcpy(&taps->pair[k][m], at, sizeof(int32_t));
         taps->major[m] = from_apex;
         taps->centre[m] = (float)centre - walk->a_minor;
         taps->expected[m] = expected - (float)centre;
         taps->is_inside[m] = is_inside;
     }
     for (uint32_t m = walk->n; m < taps->n_lanes; m++) {
-        for (int32_t k = 0; k < n_taps; k++) taps->along[k][m] = taps->normal[k][m] = 0.0f;
+        for (int32_t k = 0; k < n_taps; k++) taps->pair[k][m] = 0;
         taps->major[m] = taps->centre[m] = taps->expected[m] = 0.0f;
         taps->is_inside[m] = 0;
     }
     const float nx = walk->nx, ny = walk->ny;
     for (int32_t k = 0; k < n_taps; k++) {
         for (uint32_t m = 0; m < taps->n_lanes; m++) {
-            const float dx = taps->along[k][m], dy = taps->normal[k][m];
+            const int32_t pair = taps->pair[k][m];
+#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+            const float dx = (float)(int16_t)(uint16_t)((uint32_t)pair & 0xffffu), dy = (float)(pair >> 16);
+#else
+            const float dx = (float)(pair >> 16), dy = (float)(int16_t)(uint16_t)((uint32_t)pair & 0xffffu);
+#endif
             taps->normal[k][m] = dx * nx + dy * ny;
             taps->along[k][m] = dy * nx - dx * ny;
         }
