@@ -28,7 +28,7 @@ struct AccuracyOptions {
 struct AccuracyRow {
     std::string set;
     int variance;
-    std::string method; /* fixed, grown, grown-auto, thesis, gftt+subpix */
+    std::string method; /* fixed, grown, grown-auto, thesis, gftt+subpix; bound: what noise allows */
     int lambda_px;      /* 0 where it means nothing */
     std::map<std::string, double> figures;
     std::vector<Verdict> verdicts;

@@ -92,13 +92,9 @@ Scene make_cell(Random &random, int n_branches, bool is_t)
     const cv::Point2d apex(middle + random.uniform(-1, 1), middle + random.uniform(-1, 1));
     const std::vector<double> gap = draw_gaps(random, n_branches, is_t);
     const std::vector<double> level = draw_levels(random, n_branches);
-    Scene scene{{kCellPx, kCellPx, 128, {}}, {{apex, {}, true}}, kCellMarginPx};
-    double angle = random.uniform(0, 2 * kPi);
-    for (std::size_t i = 0; i < gap.size(); i++) {
-        scene.picture.polygons.push_back(sector(apex, angle, gap[i], level[i]));
-        scene.junctions[0].angle_rad.push_back(wrapped(angle));
-        angle += gap[i];
-    }
+    std::vector<double> angle = {random.uniform(0, 2 * kPi)};
+    for (std::size_t i = 0; i + 1 < gap.size(); i++) angle.push_back(wrapped(angle.back() + gap[i]));
+    Scene scene{fan(apex, angle, level), {{apex, angle, true}}, kCellMarginPx};
     std::sort(scene.junctions[0].angle_rad.begin(), scene.junctions[0].angle_rad.end());
     return scene;
 }
@@ -291,6 +287,16 @@ double turn_between(double a_rad, double b_rad)
 {
     const double turn = wrapped(a_rad - b_rad);
     return std::min(turn, 2 * kPi - turn);
+}
+
+Picture fan(const cv::Point2d &apex_px, const std::vector<double> &angle_rad, const std::vector<double> &level)
+{
+    Picture picture{kCellPx, kCellPx, 128, {}};
+    for (std::size_t i = 0; i < angle_rad.size(); i++) {
+        const double gap = wrapped(angle_rad[(i + 1) % angle_rad.size()] - angle_rad[i]);
+        picture.polygons.push_back(sector(apex_px, angle_rad[i], gap, level[i]));
+    }
+    return picture;
 }
 
 std::vector<Scene> make_cells(int count)

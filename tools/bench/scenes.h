@@ -28,6 +28,9 @@ struct Scene {
  * bar of a T. */
 std::vector<Scene> make_cells(int count);
 
+/* Sectors of grey round an apex, each from its angle to the next one's, that reach beyond an image of that size. */
+Picture fan(const cv::Point2d &apex_px, const std::vector<double> &angle_rad, const std::vector<double> &level);
+
 /* 640x480, triangles and quadrangles of one grey each, some concave, that do not touch; sides of 24 px and more,
  * inner angles of 25 to 155 degrees or beyond 205, contrast 25..120. */
 std::vector<Scene> make_polygons(int count);
