@@ -162,11 +162,12 @@ TEST(repeatability, counts_what_both_views_see_and_no_more)
 TEST(scenes, hold_what_they_promise)
 {
     int n_of_kind[OC_KIND_X + 1] = {};
-    for (const Scene &scene : make_cells(60)) n_of_kind[true_kind(scene.junctions.at(0))]++;
+    for (const Scene &scene : make_cells(60)) n_of_kind[kind_of(scene.junctions.at(0))]++;
     EXPECT_THAT(n_of_kind, testing::ElementsAre(0, 20, 10, 10, 20));
+    EXPECT_THAT(make_set("cells-T", true), SizeIs(20));
     for (const Scene &scene : make_chessboards(2)) {
         for (const TrueJunction &junction : scene.junctions) {
-            EXPECT_EQ(true_kind(junction), OC_KIND_X);
+            EXPECT_EQ(kind_of(junction), OC_KIND_X);
             EXPECT_THAT(junction.angle_rad, SizeIs(4));
         }
     }
@@ -184,6 +185,7 @@ TEST(scenes, are_the_same_every_time)
     ASSERT_EQ(first.junctions.size(), again.junctions.size());
     for (std::size_t i = 0; i < first.junctions.size(); i++)
         EXPECT_EQ(first.junctions[i].at_px, again.junctions[i].at_px);
+    EXPECT_NE(make_polygons(1, 1).at(0).junctions.at(0).at_px, first.junctions[0].at_px);
 }
 
 // ---- counts

@@ -21,6 +21,7 @@ struct Damage {
 struct AccuracyOptions {
     std::vector<std::string> sets;
     std::vector<int> variances, lambdas;
+    int draw = 0;
     bool is_quick = false, has_rivals = true, is_checked = false;
     Damage damage;
 };

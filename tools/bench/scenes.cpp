@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scenes.h"
 
+#include "core/junction.h"
 #include "random.h"
 
 #include <algorithm>
@@ -265,11 +266,12 @@ Scene make_triangle(Random &random)
 }
 
 template <typename Make>
-std::vector<Scene> make_many(int count, std::uint64_t salt, Make make)
+std::vector<Scene> make_many(int count, int draw, std::uint64_t salt, Make make)
 {
     std::vector<Scene> scenes;
     for (int i = 0; i < count; i++) {
-        Random random(kSeed + 1000000 * salt + static_cast<std::uint64_t>(i));
+        Random random(kSeed + 1000000 * salt + 100000000 * static_cast<std::uint64_t>(draw) +
+                      static_cast<std::uint64_t>(i));
         scenes.push_back(make(random, i));
     }
     return scenes;
@@ -299,33 +301,50 @@ Picture fan(const cv::Point2d &apex_px, const std::vector<double> &angle_rad, co
     return picture;
 }
 
-std::vector<Scene> make_cells(int count)
+std::vector<Scene> make_cells(int count, int draw)
 {
-    return make_many(count, 1, [](Random &random, int i) { return make_cell(random, 2 + i % 3, i % 6 == 1); });
+    return make_many(count, draw, 1, [](Random &random, int i) { return make_cell(random, 2 + i % 3, i % 6 == 1); });
 }
 
-std::vector<Scene> make_polygons(int count)
+std::vector<Scene> make_polygons(int count, int draw)
 {
-    return make_many(count, 2, [](Random &random, int) { return make_polygon_scene(random); });
+    return make_many(count, draw, 2, [](Random &random, int) { return make_polygon_scene(random); });
 }
 
-std::vector<Scene> make_chessboards(int count)
+std::vector<Scene> make_chessboards(int count, int draw)
 {
-    return make_many(count, 3, [](Random &random, int) { return make_chessboard(random); });
+    return make_many(count, draw, 3, [](Random &random, int) { return make_chessboard(random); });
 }
 
-std::vector<Scene> make_triangles(int count)
+std::vector<Scene> make_triangles(int count, int draw)
 {
-    return make_many(count, 4, [](Random &random, int) { return make_triangle(random); });
+    return make_many(count, draw, 4, [](Random &random, int) { return make_triangle(random); });
 }
 
-std::vector<Scene> make_set(const std::string &name, bool is_quick)
+const std::vector<std::string> kSets = {"cells", "polys", "chess", "triangles"};
+const std::vector<std::string> kCellSets = {"cells-L", "cells-T", "cells-Y", "cells-X"};
+
+std::vector<Scene> make_set(const std::string &name, bool is_quick, int draw)
 {
-    if (name == "cells") return make_cells(is_quick ? 120 : 300);
-    if (name == "polys") return make_polygons(is_quick ? 1 : 4);
-    if (name == "chess") return make_chessboards(is_quick ? 1 : 4);
-    if (name == "triangles") return make_triangles(is_quick ? 20 : 60);
-    throw std::invalid_argument("no set is called " + name);
+    if (name == "cells") return make_cells(is_quick ? 120 : 300, draw);
+    if (name == "polys") return make_polygons(is_quick ? 1 : 4, draw);
+    if (name == "chess") return make_chessboards(is_quick ? 1 : 4, draw);
+    if (name == "triangles") return make_triangles(is_quick ? 20 : 60, draw);
+    const auto cells = std::find(kCellSets.begin(), kCellSets.end(), name);
+    if (cells == kCellSets.end()) throw std::invalid_argument("no set is called " + name);
+    const int kind = OC_KIND_L + static_cast<int>(cells - kCellSets.begin());
+    std::vector<Scene> some;
+    for (const Scene &scene : make_set("cells", is_quick, draw)) {
+        if (kind_of(scene.junctions.at(0)) == kind) some.push_back(scene);
+    }
+    return some;
+}
+
+int kind_of(const TrueJunction &junction)
+{
+    std::vector<oc_branch_t> branches;
+    for (const double angle : junction.angle_rad) branches.push_back({static_cast<float>(angle), 0, 0});
+    return oc_junction_kind_of(branches.data(), static_cast<unsigned>(branches.size()));
 }
 
 } // namespace outcrop::bench
