@@ -107,8 +107,9 @@ def accuracy_section(bench):
     text = ("### Accuracy\n\nScenes drawn exactly (area-true, blur 0.7 px). Each cell: recall/precision within 2 px, "
             "RMSE (median) of the matched, RMSE of branch angles matched within 15 degrees. Sigma and t_b are 1.2 and "
             "6 up to variance 100, 1.5 and 8 at 400, 1.8 and 8 at 1000. The bound is Cramér and Rao's, from the "
-            "pixels within lambda of the apex, over all cells, for an estimate that is told how many branches there are; "
-            "a detector's own figure can lie below it where it loses the worst cells or cuts errors off at 2 px.\n\n")
+            "pixels within lambda of the apex, over all cells, for an estimate that is told how many branches there "
+            "are; a detector's own figure can lie below it where it loses the worst cells or cuts errors off at 2 "
+            "px.\n\n")
     for name in unique(row["set"] for row in bench["accuracy"]):
         rows = [row for row in bench["accuracy"] if row["set"] == name]
         text += f"{SET_NAMES[name]}, {number(rows[0]['figures']['n_truth'])} junctions:\n\n{accuracy_table(rows)}\n"
