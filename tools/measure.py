@@ -279,11 +279,18 @@ def json_text(result):
     return json.dumps(head)[:-1] + ', "runs": [\n' + runs + "\n]}\n"
 
 
+def bench_part():
+    """What tools/bench.sh measured last, or None."""
+    file = ROOT / "docs" / "bench.json"
+    return json.loads(file.read_text()) if file.is_file() else None
+
+
 def main():
     options = parse_options()
     result = collect(options)
-    document = measure_document.text(result)
-    if options.quick or options.only:
+    is_partial = options.quick or options.only
+    document = measure_document.text(result, None if is_partial else bench_part())
+    if is_partial:
         print(document)
     else:
         pictures = ROOT / "docs" / "pictures"

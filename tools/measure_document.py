@@ -2,6 +2,8 @@
 """docs/measurements.md out of measure.py's records: tables, verdicts and the sentences that compare."""
 from statistics import mean, median
 
+import bench_document
+
 MIN_IOU = 0.3          # an obstacle below it counts as missed, as outcrop-eval counts
 MAX_FALSE = 1
 MIN_PRECISION = 0.90
@@ -360,7 +362,8 @@ def times_section(result):
             vehicle_table(runs) + "\nThe base by step, the whole drive, the evaluation:\n\n" + base_table(runs) + "\n")
 
 
-def text(result):
+def text(result, bench=None):
+    """bench: what docs/bench.json holds, whose part stands at the end."""
     parts = [head_section(result), targets_section(result), same_boxes_section(result), seeds_section(result),
              sites_section(result), repeats_section(result), real_section(result), times_section(result)]
-    return "".join(parts).rstrip() + "\n"
+    return ("".join(parts) + (bench_document.text(bench) if bench else "")).rstrip() + "\n"

@@ -2,9 +2,11 @@
 // The bench's own parts: pictures against closed forms, counts against cases worked by hand.
 #include "bench/picture.h"
 #include "bench/random.h"
+#include "bench/repeatability.h"
 #include "bench/scenes.h"
 #include "bench/score.h"
 #include "bench/target.h"
+#include "bench/warp.h"
 
 #include <cmath>
 #include <gmock/gmock.h>
@@ -102,16 +104,70 @@ TEST(noise, has_the_variance_asked_for)
     }
 }
 
+// ---- warps
+
+cv::Mat ramp(int width, int height)
+{
+    cv::Mat image(height, width, CV_8U);
+    for (int y = 0; y < height; y++) {
+        for (int x = 0; x < width; x++) image.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(20 + x + 2 * y);
+    }
+    return image;
+}
+
+TEST(warp, puts_grey_where_the_homography_says)
+{
+    const cv::Mat image = ramp(70, 60);
+    const cv::Matx33d views[] = {rotation_deg(15), rotation_deg(45), scaling(0.75), scaling(0.5), tilt_deg(40, 127)};
+    for (const cv::Matx33d &view : views) {
+        const cv::Matx33d matrix = about_middle(view, image.cols, image.rows);
+        const cv::Mat seen = warped(image, matrix, image.size());
+        for (int y = 12; y < 48; y++) {
+            for (int x = 20; x < 50; x++) {
+                const cv::Point2d from = transformed(cv::Point2d(x, y), matrix.inv());
+                if (from.x < 6 || from.y < 6 || from.x > 63 || from.y > 53) continue;
+                // Rounding to whole grey levels, twice; half a pixel would be 0.5 and 1 more.
+                EXPECT_NEAR(seen.at<std::uint8_t>(y, x), 20 + from.x + 2 * from.y, 0.8);
+            }
+        }
+    }
+}
+
+TEST(warp, tilts_as_a_pinhole_camera_does)
+{
+    // The point 100 px right of the middle on a plane leant back by 60 degrees, seen from 800 px away.
+    const cv::Point2d seen = transformed(cv::Point2d(100, 0), tilt_deg(60, 0));
+    EXPECT_THAT(seen.x, DoubleNear(800 * 50 / (800 + 100 * std::sqrt(0.75)), 1e-9));
+    EXPECT_THAT(transformed(cv::Point2d(0, 0), tilt_deg(60, 33)).x, DoubleNear(0, 1e-12));
+}
+
+TEST(repeatability, counts_what_both_views_see_and_no_more)
+{
+    const Views views{{100, 100}, {100, 100}, {1, 0, 30, 0, 1, 0, 0, 0, 1}}; // 30 px to the right
+    const auto at = [](double x, double y) { return Found{{x, y}, 1, {}, OC_KIND_OTHER}; };
+    const std::vector<Found> first = {at(20, 50), at(80, 50) /* leaves */, at(40, 50), at(30, 30), at(5, 50)};
+    const std::vector<Found> second = {at(51, 50), at(20, 50) /* comes in */, at(73, 50), at(61, 31)};
+    int n = 100;
+    EXPECT_DOUBLE_EQ(share_repeated(views, first, second, &n), 2.0 / 3); // 3 px off is not found again
+    EXPECT_EQ(n, 3);
+    n = 1;
+    EXPECT_DOUBLE_EQ(share_repeated(views, first, second, &n), 1);
+    EXPECT_EQ(n, 1);
+    EXPECT_DOUBLE_EQ(share_repeated(views, first, {}, &n), 0);
+    EXPECT_EQ(n, 0);
+}
+
 // ---- scenes
 
 TEST(scenes, hold_what_they_promise)
 {
     int n_of_kind[OC_KIND_X + 1] = {};
-    for (const Scene &scene : make_cells(60)) n_of_kind[true_kind(scene.junctions.at(0))]++;
+    for (const Scene &scene : make_cells(60)) n_of_kind[kind_of(scene.junctions.at(0))]++;
     EXPECT_THAT(n_of_kind, testing::ElementsAre(0, 20, 10, 10, 20));
+    EXPECT_THAT(make_set("cells-T", true), SizeIs(20));
     for (const Scene &scene : make_chessboards(2)) {
         for (const TrueJunction &junction : scene.junctions) {
-            EXPECT_EQ(true_kind(junction), OC_KIND_X);
+            EXPECT_EQ(kind_of(junction), OC_KIND_X);
             EXPECT_THAT(junction.angle_rad, SizeIs(4));
         }
     }
@@ -129,6 +185,7 @@ TEST(scenes, are_the_same_every_time)
     ASSERT_EQ(first.junctions.size(), again.junctions.size());
     for (std::size_t i = 0; i < first.junctions.size(); i++)
         EXPECT_EQ(first.junctions[i].at_px, again.junctions[i].at_px);
+    EXPECT_NE(make_polygons(1, 1).at(0).junctions.at(0).at_px, first.junctions[0].at_px);
 }
 
 // ---- counts

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "accuracy.h"
 
+#include "bound.h"
 #include "random.h"
 #include "score.h"
 
@@ -103,6 +104,17 @@ AccuracyRow measure_gftt(const std::string &set, int variance, const std::vector
     return {set, variance, "gftt+subpix", 0, tally.figures(), {}};
 }
 
+// `bounds` are those of variance 1, one for each of the options' lambdas.
+void add_bounds(std::vector<AccuracyRow> &rows, const std::string &set, int variance, const AccuracyOptions &options,
+                const std::vector<std::map<std::string, double>> &bounds)
+{
+    for (std::size_t i = 0; i < bounds.size(); i++) {
+        std::map<std::string, double> figures;
+        for (const auto &[name, value] : bounds[i]) figures[name] = value * std::sqrt(variance);
+        rows.push_back({set, variance, "bound", options.lambdas[i], figures, {}});
+    }
+}
+
 // ---- text
 
 std::string cell(const AccuracyRow &row, const char *figure, int places, double scale = 1)
@@ -120,13 +132,17 @@ std::vector<AccuracyRow> measure_accuracy(const AccuracyOptions &options)
 {
     std::vector<AccuracyRow> rows;
     for (const std::string &set : options.sets) {
-        const std::vector<Scene> scenes = make_set(set, options.is_quick);
+        const std::vector<Scene> scenes = make_set(set, options.is_quick, options.draw);
         Images clean;
         for (const Scene &scene : scenes) clean.push_back(render(scene.picture));
+        std::vector<std::map<std::string, double>> bounds;
+        if (options.has_rivals && set.rfind("cells", 0) == 0) bounds = information_bounds(scenes, options.lambdas);
         for (const int variance : options.variances) {
             Images images;
             for (const cv::Mat &image : clean)
-                images.push_back(with_noise(image, variance, kSeed + images.size() * 7919 + set.size()));
+                images.push_back(with_noise(image, variance,
+                                            kSeed + images.size() * 7919 + set.size() +
+                                                1000003 * static_cast<std::uint64_t>(options.draw)));
             for (const Method &method : methods_for(variance, options)) {
                 rows.push_back(measure_method(set, variance, method, scenes, images, options.damage));
                 if (method.name == "fixed")
@@ -134,6 +150,7 @@ std::vector<AccuracyRow> measure_accuracy(const AccuracyOptions &options)
                                                                     : accuracy_targets(set, variance, method.lambda_px),
                                                  rows.back().figures);
             }
+            if (variance > 0) add_bounds(rows, set, variance, options, bounds);
             if (options.has_rivals) rows.push_back(measure_gftt(set, variance, scenes, images));
         }
     }

@@ -21,6 +21,7 @@ struct Damage {
 struct AccuracyOptions {
     std::vector<std::string> sets;
     std::vector<int> variances, lambdas;
+    int draw = 0;
     bool is_quick = false, has_rivals = true, is_checked = false;
     Damage damage;
 };
@@ -28,7 +29,7 @@ struct AccuracyOptions {
 struct AccuracyRow {
     std::string set;
     int variance;
-    std::string method; /* fixed, grown, grown-auto, thesis, gftt+subpix */
+    std::string method; /* fixed, grown, grown-auto, thesis, gftt+subpix; bound: what noise allows */
     int lambda_px;      /* 0 where it means nothing */
     std::map<std::string, double> figures;
     std::vector<Verdict> verdicts;

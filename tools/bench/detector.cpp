@@ -71,7 +71,7 @@ std::vector<Found> find_gftt(const cv::Mat &grey, int count, double margin_px, b
     cv::Mat mask(grey.size(), CV_8U, cv::Scalar(0));
     mask(cv::Rect(margin, margin, grey.cols - 2 * margin, grey.rows - 2 * margin)) = 255;
     std::vector<cv::Point2f> corners;
-    cv::goodFeaturesToTrack(grey, corners, count, 0.001, 5, mask, 3);
+    cv::goodFeaturesToTrack(grey, corners, count, 0.001, 5, mask, is_refined ? 5 : 3);
     if (is_refined && !corners.empty()) {
         const cv::TermCriteria until(cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 40, 0.001);
         cv::cornerSubPix(grey, corners, cv::Size(5, 5), cv::Size(-1, -1), until);

@@ -37,7 +37,8 @@ private:
     cv::Size size_;
 };
 
-/* Shi-Tomasi corners refined by cornerSubPix, the best `count` at least 5 px apart and margin_px inside. */
+/* Shi-Tomasi corners, the best `count` at least 5 px apart and margin_px inside: with windows of 3 px as found, or
+ * with windows of 5 px, better under noise, and refined by cornerSubPix. */
 std::vector<Found> find_gftt(const cv::Mat &grey, int count, double margin_px, bool is_refined);
 
 /* Corners strongest first, without branches. */

@@ -3,6 +3,7 @@
 #include "accuracy.h"
 #include "random.h"
 #include "repeatability.h"
+#include "scenes.h"
 #include "thesis.h"
 
 #include <CLI/CLI.hpp>
@@ -43,14 +44,14 @@ int judge_all(const std::vector<Row> &rows, const char *what)
 
 int run_accuracy(AccuracyOptions options, const std::string &set, const Output &output)
 {
-    options.sets =
-        set.empty() ? std::vector<std::string>{"cells", "polys", "chess", "triangles"} : std::vector<std::string>{set};
+    options.sets = set.empty() ? kSets : set == "kinds" ? kCellSets : std::vector<std::string>{set};
     if (options.variances.empty())
         options.variances = options.is_quick ? std::vector<int>{0, 100} : std::vector<int>{0, 100, 400, 1000};
     if (options.lambdas.empty())
         options.lambdas = options.is_quick ? std::vector<int>{10, 15} : std::vector<int>{8, 10, 13, 15, 20};
     const std::vector<AccuracyRow> rows = measure_accuracy(options);
-    std::cout << "seed " << kSeed << ", blur 0.7 px, match within 2 px and 15 degrees\n" << to_table(rows);
+    std::cout << "seed " << kSeed << ", draw " << options.draw << ", blur 0.7 px, match within 2 px and 15 degrees\n"
+              << to_table(rows);
     output.write("accuracy", to_json(rows));
     const int status = judge_all(rows, options.is_checked ? "gates" : "targets");
     return options.is_checked ? status : 0;
@@ -100,7 +101,11 @@ int run_chess_stereo(const std::filesystem::path &folder, const Output &output)
 CLI::App *add_accuracy(CLI::App &app, AccuracyOptions &options, std::string &set)
 {
     CLI::App *accuracy = app.add_subcommand("accuracy", "place and angle on exact scenes");
-    accuracy->add_option("--set", set, "only this set")->check(CLI::IsMember({"cells", "polys", "chess", "triangles"}));
+    std::vector<std::string> names = kSets;
+    names.insert(names.end(), kCellSets.begin(), kCellSets.end());
+    names.push_back("kinds");
+    accuracy->add_option("--set", set, "only this set; kinds: the cells of each kind")->check(CLI::IsMember(names));
+    accuracy->add_option("--draw", options.draw, "other scenes of the same kind")->check(CLI::Range(0, 1000));
     accuracy->add_option("--variance", options.variances, "only these noise variances")->delimiter(',');
     accuracy->add_option("--lambda", options.lambdas, "only these branch lengths, px")->delimiter(',');
     accuracy->add_flag("--quick", options.is_quick, "few scenes, variance 0 and 100, lambda 10 and 15");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scenes.h"
 
+#include "core/junction.h"
 #include "random.h"
 
 #include <algorithm>
@@ -92,13 +93,9 @@ Scene make_cell(Random &random, int n_branches, bool is_t)
     const cv::Point2d apex(middle + random.uniform(-1, 1), middle + random.uniform(-1, 1));
     const std::vector<double> gap = draw_gaps(random, n_branches, is_t);
     const std::vector<double> level = draw_levels(random, n_branches);
-    Scene scene{{kCellPx, kCellPx, 128, {}}, {{apex, {}, true}}, kCellMarginPx};
-    double angle = random.uniform(0, 2 * kPi);
-    for (std::size_t i = 0; i < gap.size(); i++) {
-        scene.picture.polygons.push_back(sector(apex, angle, gap[i], level[i]));
-        scene.junctions[0].angle_rad.push_back(wrapped(angle));
-        angle += gap[i];
-    }
+    std::vector<double> angle = {random.uniform(0, 2 * kPi)};
+    for (std::size_t i = 0; i + 1 < gap.size(); i++) angle.push_back(wrapped(angle.back() + gap[i]));
+    Scene scene{fan(apex, angle, level), {{apex, angle, true}}, kCellMarginPx};
     std::sort(scene.junctions[0].angle_rad.begin(), scene.junctions[0].angle_rad.end());
     return scene;
 }
@@ -269,11 +266,12 @@ Scene make_triangle(Random &random)
 }
 
 template <typename Make>
-std::vector<Scene> make_many(int count, std::uint64_t salt, Make make)
+std::vector<Scene> make_many(int count, int draw, std::uint64_t salt, Make make)
 {
     std::vector<Scene> scenes;
     for (int i = 0; i < count; i++) {
-        Random random(kSeed + 1000000 * salt + static_cast<std::uint64_t>(i));
+        Random random(kSeed + 1000000 * salt + 100000000 * static_cast<std::uint64_t>(draw) +
+                      static_cast<std::uint64_t>(i));
         scenes.push_back(make(random, i));
     }
     return scenes;
@@ -293,33 +291,60 @@ double turn_between(double a_rad, double b_rad)
     return std::min(turn, 2 * kPi - turn);
 }
 
-std::vector<Scene> make_cells(int count)
+Picture fan(const cv::Point2d &apex_px, const std::vector<double> &angle_rad, const std::vector<double> &level)
 {
-    return make_many(count, 1, [](Random &random, int i) { return make_cell(random, 2 + i % 3, i % 6 == 1); });
+    Picture picture{kCellPx, kCellPx, 128, {}};
+    for (std::size_t i = 0; i < angle_rad.size(); i++) {
+        const double gap = wrapped(angle_rad[(i + 1) % angle_rad.size()] - angle_rad[i]);
+        picture.polygons.push_back(sector(apex_px, angle_rad[i], gap, level[i]));
+    }
+    return picture;
 }
 
-std::vector<Scene> make_polygons(int count)
+std::vector<Scene> make_cells(int count, int draw)
 {
-    return make_many(count, 2, [](Random &random, int) { return make_polygon_scene(random); });
+    return make_many(count, draw, 1, [](Random &random, int i) { return make_cell(random, 2 + i % 3, i % 6 == 1); });
 }
 
-std::vector<Scene> make_chessboards(int count)
+std::vector<Scene> make_polygons(int count, int draw)
 {
-    return make_many(count, 3, [](Random &random, int) { return make_chessboard(random); });
+    return make_many(count, draw, 2, [](Random &random, int) { return make_polygon_scene(random); });
 }
 
-std::vector<Scene> make_triangles(int count)
+std::vector<Scene> make_chessboards(int count, int draw)
 {
-    return make_many(count, 4, [](Random &random, int) { return make_triangle(random); });
+    return make_many(count, draw, 3, [](Random &random, int) { return make_chessboard(random); });
 }
 
-std::vector<Scene> make_set(const std::string &name, bool is_quick)
+std::vector<Scene> make_triangles(int count, int draw)
 {
-    if (name == "cells") return make_cells(is_quick ? 120 : 300);
-    if (name == "polys") return make_polygons(is_quick ? 1 : 4);
-    if (name == "chess") return make_chessboards(is_quick ? 1 : 4);
-    if (name == "triangles") return make_triangles(is_quick ? 20 : 60);
-    throw std::invalid_argument("no set is called " + name);
+    return make_many(count, draw, 4, [](Random &random, int) { return make_triangle(random); });
+}
+
+const std::vector<std::string> kSets = {"cells", "polys", "chess", "triangles"};
+const std::vector<std::string> kCellSets = {"cells-L", "cells-T", "cells-Y", "cells-X"};
+
+std::vector<Scene> make_set(const std::string &name, bool is_quick, int draw)
+{
+    if (name == "cells") return make_cells(is_quick ? 120 : 300, draw);
+    if (name == "polys") return make_polygons(is_quick ? 1 : 4, draw);
+    if (name == "chess") return make_chessboards(is_quick ? 1 : 4, draw);
+    if (name == "triangles") return make_triangles(is_quick ? 20 : 60, draw);
+    const auto cells = std::find(kCellSets.begin(), kCellSets.end(), name);
+    if (cells == kCellSets.end()) throw std::invalid_argument("no set is called " + name);
+    const int kind = OC_KIND_L + static_cast<int>(cells - kCellSets.begin());
+    std::vector<Scene> some;
+    for (const Scene &scene : make_set("cells", is_quick, draw)) {
+        if (kind_of(scene.junctions.at(0)) == kind) some.push_back(scene);
+    }
+    return some;
+}
+
+int kind_of(const TrueJunction &junction)
+{
+    std::vector<oc_branch_t> branches;
+    for (const double angle : junction.angle_rad) branches.push_back({static_cast<float>(angle), 0, 0});
+    return oc_junction_kind_of(branches.data(), static_cast<unsigned>(branches.size()));
 }
 
 } // namespace outcrop::bench

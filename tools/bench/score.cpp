@@ -62,13 +62,6 @@ std::vector<Pairing> pair_angles(const std::vector<double> &truth, const std::ve
                    [&](std::size_t t, std::size_t f) { return turn_between(truth[t], found[f]); });
 }
 
-int true_kind(const TrueJunction &truth)
-{
-    std::vector<oc_branch_t> branches;
-    for (const double angle : truth.angle_rad) branches.push_back({static_cast<float>(angle), 0, 0});
-    return oc_junction_kind_of(branches.data(), static_cast<unsigned>(branches.size()));
-}
-
 void Tally::add(const Scene &scene, const std::vector<Found> &found)
 {
     std::vector<const TrueJunction *> truth;
@@ -96,7 +89,7 @@ void Tally::add_match(const TrueJunction &truth, const Found &found, double dist
     distance_px_.push_back(distance_px);
     if (found.angle_rad.empty()) return;
     n_kinds_++;
-    if (true_kind(truth) != found.kind) n_confused_++;
+    if (kind_of(truth) != found.kind) n_confused_++;
     n_true_branches_ += static_cast<int>(truth.angle_rad.size());
     n_found_branches_ += static_cast<int>(found.angle_rad.size());
     const std::vector<Pairing> pairs = pair_angles(truth.angle_rad, found.angle_rad, kMatchAngle);

@@ -43,9 +43,6 @@ private:
     std::vector<double> distance_px_, angle_error_rad_, l_bias_rad_;
 };
 
-/* oc_junction_kind_of the true branches. */
-int true_kind(const TrueJunction &truth);
-
 /* Of a triangle's corners as found, each the nearest within 2 kMatchPx; false when one is missing or has not two
  * branches. */
 bool sum_of_angles(const Scene &scene, const std::vector<Found> &found, double *sum_deg);

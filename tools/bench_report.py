@@ -1,0 +1,108 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Puts what the bench's programs wrote into docs/: bench.json, pictures/bench_*.svg, its part of measurements.md.
+
+tools/bench_report.py --from DIR [--skipped NAME]...   DIR: accuracy.json, repeatability.json, thesis.json, ...
+tools/bench_report.py --from DIR --print               the bench's part to standard output, docs/ is left alone
+tools/bench_report.py                                  writes pictures and measurements.md again from docs/bench.json
+tools/bench_report.py --check                          exit 1 unless docs are what bench.json and measurements.json make
+
+tools/bench.sh runs the programs and then this. Standard library only.
+"""
+import argparse
+import json
+import os
+import pathlib
+import platform
+import re
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+import bench_document  # noqa: E402
+import bench_plot  # noqa: E402
+import measure_document  # noqa: E402
+
+DOCS = pathlib.Path(__file__).resolve().parent.parent / "docs"
+PARTS = ["accuracy", "repeatability", "thesis", "chess-stereo", "ground"]  # written by our programs: {"seed", "result"}
+
+
+def machine():
+    try:
+        found = re.search(r"^model name\s*:\s*(.*)$", pathlib.Path("/proc/cpuinfo").read_text(), re.MULTILINE)
+    except OSError:
+        found = None
+    return f"{found.group(1) if found else platform.machine()}, {len(os.sched_getaffinity(0))} cores, one thread"
+
+
+def rounded(value):
+    if isinstance(value, dict):
+        return {key: rounded(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [rounded(item) for item in value]
+    return float(f"{value:.6g}") if isinstance(value, float) else value
+
+
+def gather(folder, skipped):
+    bench = {"machine": machine(), "skipped": skipped}
+    for name in PARTS:
+        file = folder / f"{name}.json"
+        if file.is_file():
+            given = json.loads(file.read_text())
+            bench.setdefault("seed", given.get("seed"))
+            bench[name] = rounded(given["result"])
+    if (folder / "speed.json").is_file():  # Google Benchmark's own form; its context names the machine and the folder
+        given = json.loads((folder / "speed.json").read_text())
+        bench["speed"] = {"benchmarks": rounded(given["benchmarks"])}
+    if "seed" not in bench:
+        sys.exit(f"bench_report: nothing measured in {folder}")
+    return bench
+
+
+def one_per_line(value, depth=0):
+    """JSON with the rows of each table on lines of their own, so that a change of one is a change of one line."""
+    if isinstance(value, dict) and depth < 3:
+        inner = ",\n".join(json.dumps(key) + ": " + one_per_line(item, depth + 1) for key, item in value.items())
+        return "{" + inner + "}"
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        return "[\n" + ",\n".join(json.dumps(item, separators=(",", ":")) for item in value) + "\n]"
+    return json.dumps(value, separators=(",", ":"))
+
+
+def documents(bench):
+    """{path under docs: text} of all that follows from the measurements."""
+    files = {"pictures/" + name: text for name, text in bench_plot.pictures(bench).items()}
+    measured = DOCS / "measurements.json"
+    if measured.is_file():
+        files["measurements.md"] = measure_document.text(json.loads(measured.read_text()), bench)
+    return files
+
+
+def main():
+    parser = argparse.ArgumentParser(description="Writes the bench's figures into docs/.")
+    parser.add_argument("--from", dest="source", type=pathlib.Path, metavar="DIR", help="what the programs wrote")
+    parser.add_argument("--skipped", action="append", default=[], metavar="NAME", help="a program that was not there")
+    parser.add_argument("--print", action="store_true", help="to standard output; docs/ is left alone")
+    parser.add_argument("--check", action="store_true", help="compare only; exit 1 when docs are not up to date")
+    options = parser.parse_args()
+    stored = DOCS / "bench.json"
+    bench = gather(options.source, options.skipped) if options.source else json.loads(stored.read_text())
+    if options.print:
+        print(bench_document.text(bench))
+        return 0
+    if options.source and not options.check:
+        stored.write_text(one_per_line(bench) + "\n")
+    stale = []
+    for name, text in documents(bench).items():
+        file = DOCS / name
+        if options.check:
+            stale += [name] if not file.is_file() or file.read_text() != text else []
+        else:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text)
+    for name in stale:
+        print(f"docs/{name} is not what docs/bench.json and docs/measurements.json make: run tools/bench_report.py")
+    return 1 if stale else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
