@@ -109,6 +109,8 @@ oc_status_t oc_judoca_init(oc_judoca_ws_t *ws, oc_arena_t *arena, uint32_t width
         if (status != OC_OK) return status;
     }
     ws->params = *params;
+    oc_judoca_ring_build(&ws->ring[0], 3);
+    oc_judoca_ring_build(&ws->ring[1], 6);
     ws->done = piece[0];
     ws->found = piece[1];
     ws->rank = piece[2];
@@ -250,6 +252,7 @@ static void fit_places(oc_judoca_ws_t *ws)
                                   .cos_min_bend = (float)cos((double)p->min_bend_rad),
                                   .min_bend_rad = p->min_bend_rad,
                                   .cos_first_bend = (float)cos(FIRST_BEND_SHARE * (double)p->min_bend_rad),
+                                  .ring = ws->ring,
                                   .max_rms_px = p->max_rms_px,
                                   .max_apex_sigma_px = p->max_apex_sigma_px};
     const oc_gradient_t *g = &ws->gradient;

@@ -86,6 +86,7 @@ typedef struct oc_judoca_ws {
     oc_judoca_stats_t stats;
     oc_gradient_t gradient; /* of the last image */
     oc_search_t search;
+    oc_ring_table_t ring[2];         /* looks round an apex: near it, further out */
     uint64_t *done;                  /* bitmap: apices that have been fitted */
     oc_junction_t *found;            /* [OC_JUDOCA_MAX_FOUND] */
     oc_judoca_rank_t *rank;          /* [OC_JUDOCA_MAX_FOUND] */

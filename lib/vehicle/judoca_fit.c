@@ -7,9 +7,8 @@
 
 #define PI 3.14159265358979f
 
-/* A branch is fitted over at least this length and this many positions. */
+/* A branch is fitted over at least this length. */
 #define SPAN_PX 4.0f
-#define MIN_SAMPLES 3u
 
 /* The apex is at most the reach of the blur plus this from the pixel where the
  * junction was seen. */
@@ -38,38 +37,19 @@
 #define AGAIN_PX 1.0f
 #define VAGUE_PX 0.3f
 
-/* Share of the shortest length at which the last position may lie: noise hides single ones. */
-#define LEAST_LENGTH 0.8f
-
-/* Pixels from the apex that a look round the apex takes in, and what counts as a branch that is there already. */
-#define RING_FIRST 3
-#define RING_LAST 7
-#define RING_STEP 3
+/* The furthest pixel that a look round the apex takes in, and what counts as a branch that is there already. */
+#define RING_REACH 11
 #define RING_SAME_COS 0.9f
 
 /* With the rivals taken off, positions from here on count. */
 #define MODEL_INNER_PX 1.5f
 
-/* Samples beyond this measure the blur. */
-#define FAR_PX 3.0f
-
-/* A ridge's variance across and along the edge differ by what the central difference adds across. */
-#define DIFFERENCE_PX2 0.25f
-
 /* Variance that optics and pixels add to the Gaussian's, at least and at most. */
 #define MIN_BLUR_PX2 0.3f
 #define MAX_BLUR_PX2 4.0f
 
-/* Least ridge of a branch and least derivative of one of its positions, in units of t_b: noise lifts a weak edge
- * over the threshold here and there, and the share of such pixels is asked for anyway. */
-#define LEAST_CONTRAST 0.7f
-#define LEAST_DERIVATIVE 0.5f
-
 /* Floor of a position's sd: what sampling alone leaves. */
 #define FLOOR_SIGMA_PX 0.03f
-
-/* A branch is taken beyond its shortest length only while it stays this straight. */
-#define GROW_RMS_PX 0.25f
 
 /* Contrast at which the score reaches one half, grey levels per px. */
 #define HALF_CONTRAST 6.0f
@@ -100,190 +80,6 @@ static float fit_cos_between(const oc_fit_branch_t *a, const oc_fit_branch_t *b)
 static float fit_sin_between(const oc_fit_branch_t *a, const oc_fit_branch_t *b)
 {
     return fabsf(a->ux * b->uy - a->uy * b->ux);
-}
-
-/* ---- one branch ---- */
-
-/* Samples from r0 to longest_px along a branch, cut to the image. */
-static oc_fit_walk_t walk_make(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit,
-                               const oc_fit_branch_t *branch, float r0, float longest_px, int32_t reach)
-{
-    const float ux = branch->ux, uy = branch->uy;
-    const bool flat = fabsf(ux) >= fabsf(uy);
-    const int32_t width = (int32_t)gradient->width_px, height = (int32_t)gradient->height_px;
-    const float major = flat ? ux : uy;
-    oc_fit_walk_t walk = {
-        .dxdy = gradient->dxdy,
-        .step_major = flat ? 1 : width,
-        .step_minor = flat ? width : 1,
-        .n_minor = flat ? height : width,
-        .a_major = flat ? fit->x_px : fit->y_px,
-        .a_minor = flat ? fit->y_px : fit->x_px,
-        .slope = flat ? uy / ux : ux / uy,
-        .sign = major > 0.0f ? 1 : -1,
-        .nx = -uy * branch->side,
-        .ny = ux * branch->side,
-        .own_major = major,
-        .own_minor = flat ? uy : ux,
-        .floor = LEAST_DERIVATIVE * rules->t_b * (float)OC_GRADIENT_ONE,
-        .reach = reach,
-    };
-    const float from = walk.a_major + r0 * major, to = walk.a_major + longest_px * major;
-    const int32_t last_inside = (flat ? width : height) - 2;
-    int32_t first = (int32_t)(walk.sign > 0 ? ceilf(from) : floorf(from));
-    int32_t last = (int32_t)(walk.sign > 0 ? floorf(to) : ceilf(to));
-    if (walk.sign > 0 && last > last_inside) last = last_inside;
-    if (walk.sign < 0 && last < 1) last = 1;
-    const int32_t n = (last - first) * walk.sign + 1;
-    const bool starts_inside = first >= 1 && first <= last_inside;
-    walk.first = first;
-    walk.n = n > 0 && starts_inside ? (uint32_t)n : 0;
-    if (walk.n > OC_FIT_SAMPLES) walk.n = OC_FIT_SAMPLES;
-    return walk;
-}
-
-/* What the other branches add to this one's derivative. */
-static uint32_t rivals_make(const oc_fit_t *fit, uint32_t self, oc_fit_rival_t rivals[OC_FIT_MAX_BRANCHES])
-{
-    const oc_fit_branch_t *own = &fit->branch[self];
-    uint32_t n = 0;
-    for (uint32_t j = 0; j < fit->n; j++) {
-        const oc_fit_branch_t *other = &fit->branch[j];
-        const float agree = own->side * other->side * fit_cos_between(own, other);
-        if (j == self || fabsf(agree) < 0.02f) continue;
-        rivals[n++] = (oc_fit_rival_t){other->ux, other->uy, agree * other->amplitude};
-    }
-    return n;
-}
-
-/* Sums over the first samples of a branch. */
-typedef struct fit_prefix {
-    oc_fit_sums_t sums;
-    float t;
-    float share; /* edges / looked for */
-} fit_prefix_t;
-
-/* Share of the full ridge at a distance from the apex: the Gaussian's integral, a cubic is enough for a weight. */
-static float fit_gain(float t, float inv_st)
-{
-    float x = t * inv_st * (1.0f / 2.4f);
-    x = x < 1.0f ? x : 1.0f;
-    return 0.5f + 0.75f * x - 0.25f * x * x * x;
-}
-
-static void prefix_add(oc_fit_sums_t *s, float t, float d, float value, float bend, float gain)
-{
-    const float w = gain * gain;
-    s->w += w;
-    s->wt += w * t;
-    s->wtt += w * t * t;
-    s->wd += w * d;
-    s->wtd += w * t * d;
-    s->wdd += w * d * d;
-    s->value += value * gain;
-    s->gain += gain;
-    s->gain2 += w;
-    if (t < FAR_PX) return;
-    s->bend += bend;
-    s->level += value;
-}
-
-/* Where along a branch positions are asked for. */
-typedef struct fit_span {
-    float inner_px;    /* first */
-    float crowded_px;  /* nearer than this another ridge may hide them: a missing one does not count */
-    float shortest_px; /* what must be there */
-} fit_span_t;
-
-/* All positions up to the shortest length, then as far as no two in a row are missing. */
-static uint32_t prefix_collect(const oc_fit_walk_t *walk, const oc_fit_profile_t *profile,
-                               const oc_fit_branch_t *branch, const fit_span_t *span, float inv_st,
-                               fit_prefix_t prefix[OC_FIT_SAMPLES])
-{
-    const bool flat = walk->step_major == 1;
-    const float to_d = flat ? branch->ux : -branch->uy; /* minor axis on the normal (-uy, ux) */
-    const float to_t = flat ? branch->uy : branch->ux;
-    const float per_major = 1.0f / fabsf(flat ? branch->ux : branch->uy);
-    oc_fit_sums_t sums;
-    memset(&sums, 0, sizeof sums);
-    uint32_t n = 0, missing = 0, n_tried = 0, n_edges = 0;
-    for (uint32_t m = 0; m < walk->n; m++) {
-        const float along = ((float)(walk->first + (int32_t)m * walk->sign) - walk->a_major) * (float)walk->sign;
-        float t = along * per_major;
-        if (profile->found[m] == 1 && t >= span->crowded_px) {
-            n_tried++;
-            n_edges++;
-            missing = 0;
-            continue;
-        }
-        if (profile->found[m] != 2) {
-            n_tried += t >= span->crowded_px;
-            if (++missing >= 2 && t > span->shortest_px) break;
-            continue;
-        }
-        n_tried++;
-        n_edges++;
-        missing = 0;
-        const float across = profile->across[m];
-        t += across * to_t;
-        prefix_add(&sums, t, across * to_d, profile->value[m], profile->bend[m], fit_gain(t, inv_st));
-        prefix[n++] = (fit_prefix_t){sums, t, (float)n_edges / (float)n_tried};
-    }
-    return n;
-}
-
-/* The branch's own line from its sums; false when they do not make one. */
-static bool branch_solve(oc_fit_branch_t *branch, const fit_prefix_t *prefix, uint32_t n)
-{
-    const oc_fit_sums_t *s = &prefix->sums;
-    const float det = s->w * s->wtt - s->wt * s->wt;
-    if (!(det > 1e-3f * s->w * s->w)) return false;
-
-    branch->sums = *s;
-    branch->offset_px = (s->wtt * s->wd - s->wt * s->wtd) / det;
-    branch->turn_rad = (s->w * s->wtd - s->wt * s->wd) / det;
-    const float sse = s->wdd - branch->offset_px * s->wd - branch->turn_rad * s->wtd;
-    const float spare = n > 2 ? (float)(n - 2u) : 1.0f;
-    branch->rms_px = sqrtf(larger(sse, 0.0f) / s->w * (float)n / spare);
-    branch->amplitude = s->value / s->gain2;
-    branch->share = prefix->share;
-    branch->length_px = prefix->t;
-    branch->n = (float)n;
-    return true;
-}
-
-/* Follow one branch and fit its line; the longest piece that stays straight wins. */
-static bool branch_follow(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit, uint32_t i,
-                          const fit_reach_t *reach, const fit_span_t *span, oc_fit_branch_t *branch)
-{
-    oc_fit_walk_t walk =
-        walk_make(gradient, rules, fit, branch, span->inner_px,
-                  larger(reach->longest_px + span->inner_px - reach->inner_px, span->shortest_px), reach->across_px);
-    if (walk.n < MIN_SAMPLES) return false;
-    walk.has_model = reach->has_model;
-
-    const float major = fabsf(walk.step_major == 1 ? branch->ux : branch->uy);
-    const float inv_st = 1.0f / sqrtf(fit->blur_px2 - DIFFERENCE_PX2);
-    oc_fit_rival_t rivals[OC_FIT_MAX_BRANCHES];
-    oc_fit_profile_t profile;
-    gradient->kernels->profile(&walk, rivals, reach->has_model ? rivals_make(fit, i, rivals) : 0,
-                               fit->blur_px2 / (major * major), 1.0f / sqrtf(fit->blur_px2), inv_st, &profile);
-
-    fit_prefix_t prefix[OC_FIT_SAMPLES];
-    const uint32_t n_all = prefix_collect(&walk, &profile, branch, span, inv_st, prefix);
-    uint32_t n_short = 0;
-    while (n_short < n_all && prefix[n_short].t <= span->shortest_px + 0.5f) n_short++;
-    if (n_short < MIN_SAMPLES) n_short = MIN_SAMPLES;
-
-    for (uint32_t n = n_all; n >= n_short; n = n > n_short + 2 ? (n + n_short) / 2 : n - 1) {
-        if (prefix[n - 1].t < smaller(reach->shortest_px - 1.5f, LEAST_LENGTH * reach->shortest_px)) return false;
-        if (!branch_solve(branch, &prefix[n - 1], n)) return false;
-        const float limit = n > n_short ? GROW_RMS_PX : rules->max_rms_px;
-        if (branch->rms_px <= limit && branch->share >= rules->s_j) {
-            return branch->amplitude >= LEAST_CONTRAST * rules->t_b * (float)OC_GRADIENT_ONE;
-        }
-    }
-    return false;
 }
 
 /* ---- all branches ---- */
@@ -442,6 +238,15 @@ static bool fit_bends(const oc_fit_t *fit, float cos_min_angle, float cos_min_be
     return false;
 }
 
+/* What an acute pair loses at the tip it may take further out. */
+static bool branch_follow_from(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit,
+                               uint32_t i, const fit_reach_t *reach, oc_fit_span_t *span, oc_fit_branch_t *branch)
+{
+    span->shortest_px = larger(reach->shortest_px, span->inner_px + SPAN_PX);
+    span->longest_px = larger(reach->longest_px + span->inner_px - reach->inner_px, span->shortest_px);
+    return oc_judoca_branch_follow(gradient, rules, fit, i, span, branch);
+}
+
 /* Once round: follow all branches from the apex, then move the apex. */
 static bool fit_pass(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const fit_reach_t *reach,
                      oc_fit_t *fit, float *moved_px)
@@ -450,15 +255,18 @@ static bool fit_pass(const oc_gradient_t *gradient, const oc_fit_rules_t *rules,
     next.n = 0;
     for (uint32_t i = 0; i < fit->n; i++) {
         const float acute_px = smaller(ACUTE_PX * fit_acute_cot(fit, i), ACUTE_MAX_PX);
-        fit_span_t span = {reach->inner_px, reach->inner_px + acute_px, 0.0f};
+        oc_fit_span_t span = {.inner_px = reach->inner_px,
+                              .crowded_px = reach->inner_px + acute_px,
+                              .asked_px = reach->shortest_px,
+                              .across_px = reach->across_px,
+                              .has_model = reach->has_model};
         if (reach->across_px > 0) span.inner_px = span.crowded_px;
-        span.shortest_px = larger(reach->shortest_px, span.inner_px + SPAN_PX);
         oc_fit_branch_t branch = fit->branch[i];
-        bool holds = branch_follow(gradient, rules, fit, i, reach, &span, &branch);
+        bool holds = branch_follow_from(gradient, rules, fit, i, reach, &span, &branch);
         if (!holds && span.inner_px > reach->inner_px + 0.5f) {
-            span = (fit_span_t){reach->inner_px, span.crowded_px, larger(reach->shortest_px, reach->inner_px + SPAN_PX)};
+            span.inner_px = reach->inner_px;
             branch = fit->branch[i];
-            holds = branch_follow(gradient, rules, fit, i, reach, &span, &branch);
+            holds = branch_follow_from(gradient, rules, fit, i, reach, &span, &branch);
         }
         if (holds) next.branch[next.n++] = branch;
     }
@@ -472,7 +280,23 @@ static bool fit_pass(const oc_gradient_t *gradient, const oc_fit_rules_t *rules,
     *moved_px = sqrtf(move[0] * move[0] + move[1] * move[1]);
     *fit = next;
     fit_measure_blur(fit, rules->sigma_px);
-    return fit_is_near(fit) && fit_bends(fit, rules->cos_min_angle, reach->has_model ? rules->cos_min_bend : rules->cos_first_bend);
+    return fit_is_near(fit) &&
+           fit_bends(fit, rules->cos_min_angle, reach->has_model ? rules->cos_min_bend : rules->cos_first_bend);
+}
+
+void oc_judoca_ring_build(oc_ring_table_t *table, int32_t first_px)
+{
+    OC_ASSERT(table && first_px + (int32_t)OC_RING_SAMPLES <= RING_REACH);
+
+    for (uint32_t d = 0; d < OC_RAYS; d++) {
+        const double angle = d * 6.283185307179586 / OC_RAYS;
+        table->ux[d] = (float)cos(angle);
+        table->uy[d] = (float)sin(angle);
+        for (uint32_t s = 0; s < OC_RING_SAMPLES; s++) {
+            table->dx[s][d] = (int8_t)lrint((first_px + (int32_t)s) * cos(angle));
+            table->dy[s][d] = (int8_t)lrint((first_px + (int32_t)s) * sin(angle));
+        }
+    }
 }
 
 bool oc_judoca_fit_begin(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, float x_px, float y_px,
@@ -497,60 +321,14 @@ bool oc_judoca_fit_begin(const oc_gradient_t *gradient, const oc_fit_rules_t *ru
 
 /* ---- branches the place did not show ---- */
 
-/* cos of i / 32 of a turn, i = 0..8. */
-static const float kRing[9] = {1.0f,         0.98078528f,  0.923879533f, 0.831469612f, 0.707106781f,
-                               0.555570233f, 0.382683432f, 0.195090322f, 0.0f};
-
-static void ring_vector(uint32_t direction, float *x, float *y)
-{
-    const uint32_t part = direction % 8u;
-    const float c = kRing[part], s = kRing[8u - part];
-    switch (direction / 8u % 4u) {
-    case 0:
-        *x = c;
-        *y = s;
-        break;
-    case 1:
-        *x = -s;
-        *y = c;
-        break;
-    case 2:
-        *x = -c;
-        *y = -s;
-        break;
-    default:
-        *x = s;
-        *y = -c;
-        break;
-    }
-}
-
-/* Derivative across each direction, mean over a few pixels from the apex
- * outwards; 0 where the sign is not steady. False near the border. */
-static bool ring_measure(const oc_gradient_t *gradient, const oc_fit_t *fit, float floor, int32_t first, int32_t last,
+/* Derivatives across all directions near the apex, or a little further out; false near the border. */
+static bool ring_measure(const oc_gradient_t *gradient, const oc_fit_t *fit, float floor, const oc_ring_table_t *table,
                          float ring[OC_RAYS])
 {
     const int32_t x = (int32_t)floorf(fit->x_px + 0.5f), y = (int32_t)floorf(fit->y_px + 0.5f);
     const int32_t width = (int32_t)gradient->width_px, height = (int32_t)gradient->height_px;
-    if (x < last + 1 || y < last + 1 || x + last + 1 >= width || y + last + 1 >= height) {
-        return false;
-    }
-    for (uint32_t d = 0; d < OC_RAYS; d++) {
-        float ux, uy, sum = 0.0f;
-        int32_t n_front = 0, n_back = 0;
-        ring_vector(d, &ux, &uy);
-        for (int32_t t = first; t <= last; t++) {
-            const int32_t px = (int32_t)(fit->x_px + ux * (float)t + 0.5f),
-                          py = (int32_t)(fit->y_px + uy * (float)t + 0.5f);
-            const int16_t *g = gradient->dxdy + 2 * (py * width + px);
-            const float v = ux * g[1] - uy * g[0];
-            sum += v;
-            n_front += v > floor;
-            n_back += v < -floor;
-        }
-        const int32_t n_steady = sum > 0.0f ? n_front : n_back;
-        ring[d] = n_steady >= last - first ? sum / (float)(last - first + 1) : 0.0f;
-    }
+    if (x < RING_REACH || y < RING_REACH || x + RING_REACH >= width || y + RING_REACH >= height) return false;
+    gradient->kernels->ring(table, gradient->dxdy + 2 * ((ptrdiff_t)y * width + x), width, floor, ring);
     return true;
 }
 
@@ -564,19 +342,20 @@ static bool fit_has_branch(const oc_fit_t *fit, const oc_fit_branch_t *made)
 
 /* Seen from where the apex turned out to be, edges may run in directions that
  * the place, a pixel or two aside, did not show: those are added. */
-static void fit_look_round(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, int32_t first, int32_t last,
+static void fit_look_round(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_ring_table_t *table,
                            oc_fit_t *fit)
 {
     float ring[OC_RAYS];
     const float t_b = rules->t_b * (float)OC_GRADIENT_ONE;
-    if (!ring_measure(gradient, fit, 0.4f * t_b, first, last, ring)) return;
+    if (!ring_measure(gradient, fit, 0.4f * t_b, table, ring)) return;
     for (uint32_t d = 0; d < OC_RAYS && fit->n < OC_FIT_MAX_BRANCHES; d++) {
         const float side = ring[d] > 0.0f ? 1.0f : -1.0f, here = side * ring[d];
         const float before = side * ring[(d + OC_RAYS - 1u) % OC_RAYS], after = side * ring[(d + 1u) % OC_RAYS];
         if (!(here >= 0.7f * t_b && here > before && here >= after)) continue;
         oc_fit_branch_t made;
         memset(&made, 0, sizeof made);
-        ring_vector(d, &made.ux, &made.uy);
+        made.ux = table->ux[d];
+        made.uy = table->uy[d];
         made.side = side;
         made.amplitude = here;
         if (!fit_has_branch(fit, &made)) fit->branch[fit->n++] = made;
@@ -671,15 +450,14 @@ bool oc_judoca_fit_finish(const oc_gradient_t *gradient, const oc_fit_rules_t *r
 
     float moved_px = 1.0f, length_px = FIRST_LOOK_PX;
     for (uint32_t pass = 0; pass < PASSES; pass++) {
-        if (pass < 2)
-            fit_look_round(gradient, rules, RING_FIRST + (int32_t)pass * RING_STEP,
-                           RING_LAST + (int32_t)pass * RING_STEP, fit);
+        if (pass < 2) fit_look_round(gradient, rules, &rules->ring[pass], fit);
         const bool is_whole = length_px >= rules->lambda_px;
         length_px = smaller(GROWTH * length_px, rules->lambda_px);
         const int32_t across_px = pass == 0  ? (fit->moved_px > AGAIN_PX || fit->sigma_px > VAGUE_PX ? 2 : 1)
                                   : is_whole ? 0
                                              : 1;
-        const fit_reach_t reach = {across_px, MODEL_INNER_PX, smaller(rules->lambda_min_px, length_px), length_px, true};
+        const fit_reach_t reach = {across_px, MODEL_INNER_PX, smaller(rules->lambda_min_px, length_px), length_px,
+                                   true};
         if (!fit_pass(gradient, rules, &reach, fit, &moved_px)) return false;
         if (is_whole && moved_px <= SETTLED_PX) break;
     }

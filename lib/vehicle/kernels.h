@@ -50,6 +50,7 @@ typedef struct oc_ray_block {
 /* One branch seen along its major axis, so that x and y share the code. */
 typedef struct oc_fit_walk {
     const int16_t *dxdy;
+    bool is_flat;                   /* the major axis is x */
     int32_t step_major, step_minor; /* pixels, into the planes */
     int32_t n_minor;                /* image size across */
     int32_t first, sign;            /* first major coordinate and its step */
@@ -70,12 +71,21 @@ typedef struct oc_fit_rival {
     float amplitude; /* of its ridge in this branch's derivative, signed */
 } oc_fit_rival_t;
 
+/* Samples of a branch, outwards; t along it from the apex, d across it on the normal (-uy, ux), px. */
 typedef struct oc_fit_profile {
-    float across[OC_FIT_SAMPLES];  /* minor coordinate of the ridge less the line's, px of the minor axis */
-    float value[OC_FIT_SAMPLES];   /* derivative there */
+    float t[OC_FIT_SAMPLES], d[OC_FIT_SAMPLES];
+    float gain[OC_FIT_SAMPLES];    /* share of the full ridge this near to the apex */
+    float value[OC_FIT_SAMPLES];   /* derivative at the ridge */
     float bend[OC_FIT_SAMPLES];    /* 2 value - before - after */
     int32_t found[OC_FIT_SAMPLES]; /* 0 no edge, 1 an edge that does not say where, 2 a position */
 } oc_fit_profile_t;
+
+/* Round the apex: derivatives across OC_RAYS directions. */
+#define OC_RING_SAMPLES 5u
+typedef struct oc_ring_table {
+    float ux[OC_RAYS], uy[OC_RAYS];
+    int8_t dx[OC_RING_SAMPLES][OC_RAYS], dy[OC_RING_SAMPLES][OC_RAYS]; /* pixels from the apex */
+} oc_ring_table_t;
 
 typedef struct oc_kernels {
     oc_simd_t level;
@@ -103,6 +113,10 @@ typedef struct oc_kernels {
      * the same in the columns beside it; planes not set in live are empty. */
     void (*rays)(const oc_ray_table_t *table, const uint64_t *const left[OC_RAYS], const uint64_t *const mid[OC_RAYS],
                  const uint64_t *const right[OC_RAYS], uint32_t live, const uint64_t wanted[4], oc_ray_block_t *block);
+
+    /* Derivative across each direction, mean of the samples; 0 unless all but one of them are beyond floor with the
+     * mean's sign. apex points to the pair of the apex' pixel, width is the planes' pitch in pixels. */
+    void (*ring)(const oc_ring_table_t *table, const int16_t *apex, int32_t width, float floor, float ring[OC_RAYS]);
 
     /* Ridge positions along a branch, what the rivals add taken off. s2 is the
      * square of the ridge's Gaussian width along the minor axis, px; inv_s one

@@ -392,21 +392,22 @@ typedef struct kernel_ridge {
 KERNEL_INLINE void ridge_find(const kernel_taps_t *taps, kernel_ridge_t *ridge, const int32_t reach)
 {
     for (uint32_t m = 0; m < taps->n_lanes; m++) {
-        ridge->before[m] = taps->normal[0][m];
-        ridge->middle[m] = taps->normal[1][m];
-        ridge->after[m] = taps->normal[2][m];
-        ridge->along[m] = taps->along[1][m];
-        ridge->offset[m] = (float)-reach;
-    }
-    for (int32_t k = 2; k <= 2 * reach + 1; k++) {
-        for (uint32_t m = 0; m < taps->n_lanes; m++) {
-            const bool is_higher = taps->normal[k][m] > ridge->middle[m];
-            ridge->before[m] = is_higher ? taps->normal[k - 1][m] : ridge->before[m];
-            ridge->middle[m] = is_higher ? taps->normal[k][m] : ridge->middle[m];
-            ridge->after[m] = is_higher ? taps->normal[k + 1][m] : ridge->after[m];
-            ridge->along[m] = is_higher ? taps->along[k][m] : ridge->along[m];
-            ridge->offset[m] = is_higher ? (float)(k - 1 - reach) : ridge->offset[m];
+        float before = taps->normal[0][m], middle = taps->normal[1][m], after = taps->normal[2][m];
+        float along = taps->along[1][m], offset = (float)-reach;
+        for (int32_t k = 2; k <= 2 * reach + 1; k++) {
+            const float here = taps->normal[k][m];
+            const bool is_higher = here > middle;
+            before = is_higher ? taps->normal[k - 1][m] : before;
+            after = is_higher ? taps->normal[k + 1][m] : after;
+            along = is_higher ? taps->along[k][m] : along;
+            offset = is_higher ? (float)(k - 1 - reach) : offset;
+            middle = is_higher ? here : middle;
         }
+        ridge->before[m] = before;
+        ridge->middle[m] = middle;
+        ridge->after[m] = after;
+        ridge->along[m] = along;
+        ridge->offset[m] = offset;
     }
 }
 
@@ -414,7 +415,7 @@ KERNEL_INLINE void ridge_find(const kernel_taps_t *taps, kernel_ridge_t *ridge, 
 KERNEL_INLINE void ridge_clear(const oc_fit_walk_t *walk, const kernel_taps_t *taps, const oc_fit_rival_t *rival,
                                float inv_s, float inv_st, kernel_ridge_t *ridge)
 {
-    const bool flat = walk->step_major == 1;
+    const bool flat = walk->is_flat;
     const float u_major = flat ? rival->ux : rival->uy, u_minor = flat ? rival->uy : rival->ux;
     const float amplitude = rival->amplitude;
     for (uint32_t m = 0; m < taps->n_lanes; m++) {
@@ -445,8 +446,11 @@ KERNEL_INLINE void ridge_level(const oc_fit_walk_t *walk, const kernel_taps_t *t
 
 /* Vertex of the parabola through the three taps, put right for a Gaussian. */
 KERNEL_INLINE void ridge_peak(const oc_fit_walk_t *walk, const kernel_taps_t *taps, const kernel_ridge_t *ridge,
-                              float s2, const float most, oc_fit_profile_t *out)
+                              float s2, float inv_st, const float most, oc_fit_profile_t *out)
 {
+    /* The minor axis on the normal and along the branch. */
+    const float to_d = walk->is_flat ? walk->own_major : -walk->own_major, to_t = walk->own_minor;
+    const float per_major = 1.0f / walk->own_major;
     const float gain = 0.25f / s2 + (1.0f / 24.0f) / (s2 * s2);
     const float floor = walk->floor;
     for (uint32_t m = 0; m < taps->n_lanes; m++) {
@@ -457,7 +461,11 @@ KERNEL_INLINE void ridge_peak(const oc_fit_walk_t *walk, const kernel_taps_t *ta
         const float p = 0.5f * slope / (is_bent ? bend : 1.0f);
         const float near = p > 0.5f ? 0.5f : (p < -0.5f ? -0.5f : p);
         const float aside = ridge->along[m] < 0.0f ? -ridge->along[m] : ridge->along[m];
-        out->across[m] = ridge->offset[m] + p + gain * near * (1.0f - 4.0f * near * near) - taps->expected[m];
+        const float across = ridge->offset[m] + p + gain * near * (1.0f - 4.0f * near * near) - taps->expected[m];
+        const float t = taps->major[m] * per_major + across * to_t;
+        out->t[m] = t;
+        out->d[m] = across * to_d;
+        out->gain[m] = step_up(t * inv_st);
         out->value[m] = middle;
         out->bend[m] = bend;
         const int32_t is_edge = (int32_t)(middle > floor) & (int32_t)(aside <= 0.62f * middle) & taps->is_inside[m];
@@ -476,7 +484,7 @@ KERNEL_INLINE void profile_reach(const oc_fit_walk_t *walk, const oc_fit_rival_t
     for (uint32_t j = 0; j < n_rivals; j++) ridge_clear(walk, &taps, &rivals[j], inv_s, inv_st, &ridge);
     if (walk->has_model) ridge_level(walk, &taps, inv_st, &ridge);
     /* Without a search the ridge may be nearer to the next pixel. */
-    ridge_peak(walk, &taps, &ridge, s2, reach == 0 ? 1.0f : 0.51f, out);
+    ridge_peak(walk, &taps, &ridge, s2, inv_st, reach == 0 ? 1.0f : 0.51f, out);
 }
 
 static void kernel_profile(const oc_fit_walk_t *walk, const oc_fit_rival_t rivals[], uint32_t n_rivals, float s2,
@@ -489,6 +497,33 @@ static void kernel_profile(const oc_fit_walk_t *walk, const oc_fit_rival_t rival
     }
 }
 
+/* ---- round the apex ---- */
+
+static void kernel_ring(const oc_ring_table_t *table, const int16_t *apex, int32_t width, float floor,
+                        float ring[OC_RAYS])
+{
+    float gx[OC_RING_SAMPLES][OC_RAYS], gy[OC_RING_SAMPLES][OC_RAYS];
+    for (uint32_t s = 0; s < OC_RING_SAMPLES; s++) {
+        for (uint32_t d = 0; d < OC_RAYS; d++) {
+            const int16_t *at = apex + 2 * (table->dy[s][d] * width + table->dx[s][d]);
+            gx[s][d] = at[0];
+            gy[s][d] = at[1];
+        }
+    }
+    for (uint32_t d = 0; d < OC_RAYS; d++) {
+        float sum = 0.0f;
+        int32_t n_front = 0, n_back = 0;
+        for (uint32_t s = 0; s < OC_RING_SAMPLES; s++) {
+            const float v = table->ux[d] * gy[s][d] - table->uy[d] * gx[s][d];
+            sum += v;
+            n_front += (int32_t)(v > floor);
+            n_back += (int32_t)(v < -floor);
+        }
+        const int32_t n_steady = sum > 0.0f ? n_front : n_back;
+        ring[d] = n_steady >= (int32_t)OC_RING_SAMPLES - 1 ? sum * (1.0f / OC_RING_SAMPLES) : 0.0f;
+    }
+}
+
 const oc_kernels_t OC_KERNELS_TABLE = {
     .level = OC_KERNELS_LEVEL,
     .down = kernel_down,
@@ -497,6 +532,7 @@ const oc_kernels_t OC_KERNELS_TABLE = {
     .thin = kernel_thin,
     .spread = kernel_spread,
     .rays = kernel_rays,
+    .ring = kernel_ring,
     .profile = kernel_profile,
 };
 
