@@ -12,6 +12,9 @@
 /* The first look's directions are rough: it calls a line only what bends less than this share of min_bend_rad. */
 #define FIRST_BEND_SHARE 0.7
 
+/* Cosine of the least bend of two seeds, 17 degrees. */
+#define COARSE_COS_BEND 0.956f
+
 oc_judoca_params_t oc_judoca_defaults(void)
 {
     return (oc_judoca_params_t){
@@ -27,7 +30,7 @@ oc_judoca_params_t oc_judoca_defaults(void)
         .max_apex_sigma_px = 1.0f,
         .min_distance_px = 3.0f,
         .max_junctions = 600,
-        .max_candidates = 8192,
+        .max_candidates = 2000,
         .spread_cell_px = 40,
         .method = OC_JUDOCA_REFINED,
         .simd = OC_SIMD_AUTO,
@@ -179,6 +182,17 @@ static uint32_t seeds_of_side(uint32_t directions, float side, oc_fit_seed_t see
     return n;
 }
 
+/* Two seeds that are not the two ends of one straight edge; their directions are good to some 6 degrees. */
+static bool seeds_bend(const oc_fit_seed_t seed[], uint32_t n)
+{
+    for (uint32_t i = 1; i < n; i++) {
+        for (uint32_t j = 0; j < i; j++) {
+            if (seed[i].ux * seed[j].ux + seed[i].uy * seed[j].uy > -COARSE_COS_BEND) return true;
+        }
+    }
+    return false;
+}
+
 /* ---- fit ---- */
 
 /* Lowest prescore still fitted: as many of the best as max_candidates allows,
@@ -210,11 +224,11 @@ static bool done_test_and_set(const oc_judoca_ws_t *ws, float x, float y)
     return is_done;
 }
 
-/* What leads to the pixel of a junction or one beside it would find it again. */
+/* What leads to within two pixels of a junction would find it again. */
 static void done_surround(const oc_judoca_ws_t *ws, float x_px, float y_px)
 {
-    for (int32_t dy = -1; dy <= 1; dy++) {
-        for (int32_t dx = -1; dx <= 1; dx++) {
+    for (int32_t dy = -2; dy <= 2; dy++) {
+        for (int32_t dx = -2; dx <= 2; dx++) {
             const float x = x_px + 0.5f + (float)dx, y = y_px + 0.5f + (float)dy;
             if (is_in_image(&ws->gradient, x, y)) (void)done_test_and_set(ws, x, y);
         }
@@ -229,7 +243,7 @@ static bool fit_place(oc_judoca_ws_t *ws, const oc_fit_rules_t *rules, const oc_
     uint32_t n = seeds_of_side(place->left, 1.0f, seed, 0);
     n = seeds_of_side(place->right, -1.0f, seed, n);
     oc_fit_t fit;
-    if (n < 2 || !oc_judoca_fit_begin(&ws->gradient, rules, place->x, place->y, seed, n, &fit)) return false;
+    if (!seeds_bend(seed, n) || !oc_judoca_fit_begin(&ws->gradient, rules, place->x, place->y, seed, n, &fit)) return false;
 
     const float x = fit.x_px + 0.5f, y = fit.y_px + 0.5f;
     if (!is_in_image(&ws->gradient, x, y)) return false;

@@ -50,7 +50,7 @@ typedef struct oc_judoca_params {
     float min_distance_px;   /* of two apices nearer than this the better stays, 1..20; 3 */
     uint32_t max_junctions;  /* kept per image, 1..OC_MAX_JUNCTIONS; 600 */
     uint32_t max_candidates; /* places fitted per image, those of best pre-score,
-                              * 16..OC_JUDOCA_MAX_CANDIDATES; 8192. Bounds the time */
+                              * 16..OC_JUDOCA_MAX_CANDIDATES; 2000. Bounds the time */
     uint32_t spread_cell_px; /* side of the cells that share max_junctions when it
                               * binds, 8..4096; 40 */
     oc_judoca_method_t method;

@@ -18,7 +18,7 @@
 #define STRAY_PX 0.75f
 
 /* Fits after the first look, at most; another is done while the apex moves by more than SETTLED_PX. */
-#define PASSES 4u
+#define PASSES 3u
 #define SETTLED_PX 0.05f
 
 /* First look: nearer to the apex than INNER + ACUTE cot(angle to the nearest
@@ -251,8 +251,8 @@ static bool branch_follow_from(const oc_gradient_t *gradient, const oc_fit_rules
 static bool fit_pass(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const fit_reach_t *reach,
                      oc_fit_t *fit, float *moved_px)
 {
-    oc_fit_t next = *fit;
-    next.n = 0;
+    oc_fit_branch_t held[OC_FIT_MAX_BRANCHES];
+    uint32_t n_held = 0;
     for (uint32_t i = 0; i < fit->n; i++) {
         const float acute_px = smaller(ACUTE_PX * fit_acute_cot(fit, i), ACUTE_MAX_PX);
         oc_fit_span_t span = {.inner_px = reach->inner_px,
@@ -268,17 +268,18 @@ static bool fit_pass(const oc_gradient_t *gradient, const oc_fit_rules_t *rules,
             branch = fit->branch[i];
             holds = branch_follow_from(gradient, rules, fit, i, reach, &span, &branch);
         }
-        if (holds) next.branch[next.n++] = branch;
+        if (holds) held[n_held++] = branch;
     }
-    fit_merge(&next, rules->cos_min_angle);
-    if (next.n < 2) return false;
+    memcpy(fit->branch, held, n_held * sizeof held[0]);
+    fit->n = n_held;
+    fit_merge(fit, rules->cos_min_angle);
+    if (fit->n < 2) return false;
 
     float move[2];
-    if (!fit_intersect(&next, move)) return false;
-    if (fit_drop_stray(&next, move) && !fit_intersect(&next, move)) return false;
-    fit_apply(&next, move);
+    if (!fit_intersect(fit, move)) return false;
+    if (fit_drop_stray(fit, move) && !fit_intersect(fit, move)) return false;
+    fit_apply(fit, move);
     *moved_px = sqrtf(move[0] * move[0] + move[1] * move[1]);
-    *fit = next;
     fit_measure_blur(fit, rules->sigma_px);
     return fit_is_near(fit) &&
            fit_bends(fit, rules->cos_min_angle, reach->has_model ? rules->cos_min_bend : rules->cos_first_bend);
