@@ -102,8 +102,13 @@ function(outcrop_add_checks)
     add_test(NAME check_symbols_finds_violations
       COMMAND ${checks}/symbols.py --nm ${CMAKE_NM} --self-test ${CMAKE_C_COMPILER})
     list(APPEND tests check_symbols check_symbols_finds_violations)
+    if(CMAKE_C_COMPILER_ID STREQUAL "GNU") # -fcallgraph-info
+      add_test(NAME check_stack COMMAND ${checks}/stack.py ${CMAKE_BINARY_DIR})
+      add_test(NAME check_stack_finds_violations COMMAND ${checks}/stack.py --self-test ${CMAKE_C_COMPILER})
+      list(APPEND tests check_stack check_stack_finds_violations)
+    endif()
   endif()
-  set_tests_properties(${tests} PROPERTIES LABELS check TIMEOUT 60)
+  set_tests_properties(${tests} PROPERTIES LABELS check TIMEOUT 120)
 
   add_custom_target(tidy COMMAND ${checks}/tidy.sh -p ${CMAKE_BINARY_DIR} USES_TERMINAL)
   add_custom_target(format COMMAND ${checks}/format.sh --fix)
