@@ -13,7 +13,7 @@
 #include "vehicle/vehicle_internal.h"
 
 #if defined(__SANITIZE_ADDRESS__) || !defined(__x86_64__) /* instrumented or emulated: ten times slower */
-#define N_FRAMES 2000
+#define N_FRAMES 1000
 #else
 #define N_FRAMES 10000
 #endif
