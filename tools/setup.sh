@@ -15,6 +15,8 @@ packages=(
     libopencv-core-dev libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-features2d-dev libopencv-calib3d-dev
     libeigen3-dev libceres-dev libnanoflann-dev nlohmann-json3-dev libcli11-dev
     libgtest-dev libgmock-dev libbenchmark-dev
+    gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static
+    clang-14 libclang-rt-14-dev valgrind
     ffmpeg iproute2 util-linux
     python3 python3-pip python3-numpy
     ca-certificates debian-archive-keyring dpkg-dev xz-utils

@@ -7,7 +7,7 @@
  *
  *   --list         the junctions too, each number as its bits
  *   --method NAME  default, fixed (lambda 10 throughout) or thesis; all three without it
- *   --frames N     detect in every file N times and print nothing but their sum: for counting instructions */
+ *   --frames N     detect in every file N times, perhaps 0, and print nothing but their sum: for counting instructions */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,7 +22,7 @@ static const char *const method_name[N_METHODS] = {"default", "fixed", "thesis"}
 static uint8_t *px;
 static uint32_t width_px, height_px;
 static oc_junction_t found[OC_MAX_JUNCTIONS];
-static int is_listing, only_method = -1, n_frames;
+static int is_listing, only_method = -1, n_frames = -1;
 
 static oc_judoca_params_t params_of(int method)
 {
@@ -173,7 +173,7 @@ int main(int argc, char **argv)
             is_listing = 1;
         } else if (strcmp(argv[arg], "--frames") == 0 && arg + 1 < argc) {
             n_frames = (int)strtol(argv[++arg], NULL, 10);
-            if (n_frames <= 0) return usage();
+            if (n_frames < 0) return usage();
         } else if (strcmp(argv[arg], "--method") == 0 && arg + 1 < argc) {
             only_method = find_method(argv[++arg]);
             if (only_method < 0) return usage();
@@ -181,7 +181,7 @@ int main(int argc, char **argv)
             return usage();
         }
     }
-    for (int is_noise = 0; is_noise < 2 && n_frames == 0; is_noise++) {
+    for (int is_noise = 0; is_noise < 2 && n_frames < 0; is_noise++) {
         picture_make(is_noise);
         digest_picture(is_noise ? "noise" : "tiles");
     }
@@ -190,13 +190,13 @@ int main(int argc, char **argv)
             fprintf(stderr, "junction_digest: %s is no PGM of 8 bits\n", argv[arg]);
             return 1;
         }
-        if (n_frames == 0) {
+        if (n_frames < 0) {
             digest_picture(short_name(argv[arg]));
         } else {
             sum += detect(only_method > 0 ? only_method : 0, (uint32_t)n_frames);
         }
     }
-    if (n_frames > 0) printf("%" PRIu32 "\n", sum);
+    if (n_frames >= 0) printf("%" PRIu32 "\n", sum);
     free(px);
     return 0;
 }
