@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Instructions that the junction detector executes per frame, on x86-64 and on aarch64.
 
-instructions.py [--x86 PROGRAM] [--aarch64 PROGRAM] [--method NAME] [--json FILE] FILE.pgm...    adds to FILE what it counts
+instructions.py [--x86 PROGRAM] [--aarch64 PROGRAM] [--method NAME] [--json FILE] FILE.pgm...
+
+Adds what it counts to the JSON in FILE.
 
 PROGRAM is a build's tests/bin/junction_digest. What a run with one frame executes less what a run without any does is
 what one frame takes. No counter of the machine's is needed: on x86-64 valgrind's callgrind counts, for aarch64 QEMU's

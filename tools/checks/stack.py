@@ -6,8 +6,8 @@ stack.py BUILD_DIR           compiles the two libraries as the build does and ho
 stack.py --self-test CC      plants violations and fails unless each is found
 
 A chain is a way through the calls that the compiler reports, sizes added up; what it calls outside (libm, mem*, the
-assert handler) counts as EXTERNAL_BYTES. A call through a pointer counts as the worst of the functions that nobody
-calls by name. Recursion and stack of unknown size are violations.
+assert handler) counts as EXTERNAL_BYTES. A call through a pointer counts as the worst of the functions whose address is
+taken, and of the static ones that nobody calls by name. Recursion and stack of unknown size are violations.
 """
 import argparse
 import json
@@ -25,6 +25,7 @@ N_SHOWN = 10
 
 NODE = re.compile(r'^node: \{ title: "([^"]+)" label: "([^"]*)"')
 EDGE = re.compile(r'^edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
+RELOCATION = re.compile(r"^[0-9a-f]+ +(R_\w+) +(\w+)", re.MULTILINE)
 SIZE = re.compile(r"\\n(\d+) bytes \(([a-z,]+)\)")
 INDIRECT = "__indirect_call"
 
@@ -33,7 +34,7 @@ class Graph:
     """Functions with their bytes, and who calls whom. Static functions are told apart by their object file."""
 
     def __init__(self):
-        self.bytes, self.calls, self.unbounded = {}, {}, []
+        self.bytes, self.calls, self.unbounded, self.referred = {}, {}, [], set()
 
     def read(self, path, unit):
         text = path.read_text()
@@ -53,9 +54,10 @@ class Graph:
                 self.calls.setdefault(name_of(edge.group(1)), set()).add(name_of(edge.group(2)))
 
     def resolve_pointers(self):
-        """A call through a pointer may reach whatever is here without being called by name."""
+        """A call through a pointer may reach whatever is referred to without being called."""
         called = set().union(*self.calls.values()) if self.calls else set()
         open_ended = {name for name in self.bytes if name not in called and " in " in name}
+        open_ended |= self.referred & set(self.bytes)
         for targets in self.calls.values():
             if INDIRECT in targets:
                 targets.remove(INDIRECT)
@@ -117,6 +119,8 @@ def compile_into(graph, command, directory, out, unit):
     subprocess.run(command + ["-fcallgraph-info=su", "-o", out / "unit.o"], check=True, cwd=directory)
     for path in out.glob("*.ci"):
         graph.read(path, unit)
+    relocations = subprocess.run(["objdump", "-r", out / "unit.o"], check=True, capture_output=True, text=True).stdout
+    graph.referred |= {name for kind, name in RELOCATION.findall(relocations) if "PLT32" not in kind}  # those are calls
 
 
 def read_build(build):
@@ -145,6 +149,9 @@ PLANTED = {
                       "void oc_a(int n) { f(n); }\n",
     "chain from oc_a": USE + BIG.format("f", 20000, "") + "void (*const table[])(int) = {f};\n" +
                        "void oc_a(int n) { char a[20000]; use(a); table[n](n); use(a); }\n",
+    "chain from oc_b": USE + "void oc_g(int n);\nvoid oc_f(int n) { char a[20000]; a[n] = 0; use(a); }\n" +
+                       "void (*const table[])(int) = {oc_f, oc_g};\n" +
+                       "void oc_b(int n) { char a[20000]; use(a); table[n](n); use(a); }\n",
     "calls itself": USE + "int oc_a(int n) { char a[9]; use(a); return n ? oc_a(n - a[1]) + a[0] : 0; }\n",
     "without a bound": USE + "void oc_a(int n) { char a[n]; use(a); }\n",
 }
