@@ -14,7 +14,9 @@ packages=(
     libglib2.0-dev libgpiod-dev libcyaml-dev libyaml-dev libjansson-dev libjpeg62-turbo-dev libpng-dev libwebp-dev zlib1g-dev libzip-dev
     libopencv-core-dev libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-features2d-dev libopencv-calib3d-dev
     libeigen3-dev libceres-dev libnanoflann-dev nlohmann-json3-dev libcli11-dev
-    libgtest-dev libgmock-dev
+    libgtest-dev libgmock-dev libbenchmark-dev
+    gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static
+    clang-14 libclang-rt-14-dev valgrind
     ffmpeg iproute2 util-linux
     python3 python3-pip python3-numpy
     ca-certificates debian-archive-keyring dpkg-dev xz-utils

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Set-up, build and tests; the last line counts test cases: test.sh [release|debug-asan] [LABEL]
+# Set-up, build and tests; the last line counts test cases: test.sh [release|debug-asan|aarch64|fuzz] [LABEL]
 # LABEL (unit or site) builds and runs only that kind.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -8,8 +8,11 @@ cd "$(dirname "$0")/.."
 export PATH=/usr/bin:/bin:$PATH # Debian's ctest
 preset=${1:-release}
 label=${2-}
-build=build
-[ "$preset" = release ] || build=build-asan
+case "$preset" in
+    release) build=build ;;
+    debug-asan) build=build-asan ;;
+    *) build=build-$preset ;; # which build.sh knows or refuses
+esac
 tools/build.sh "$preset" ${label:+"tests_$label"}
 
 results=$PWD/$build/test_results.xml

@@ -243,7 +243,8 @@ static bool fit_place(oc_judoca_ws_t *ws, const oc_fit_rules_t *rules, const oc_
     uint32_t n = seeds_of_side(place->left, 1.0f, seed, 0);
     n = seeds_of_side(place->right, -1.0f, seed, n);
     oc_fit_t fit;
-    if (!seeds_bend(seed, n) || !oc_judoca_fit_begin(&ws->gradient, rules, place->x, place->y, seed, n, &fit)) return false;
+    if (!seeds_bend(seed, n) || !oc_judoca_fit_begin(&ws->gradient, rules, place->x, place->y, seed, n, &fit))
+        return false;
 
     const float x = fit.x_px + 0.5f, y = fit.y_px + 0.5f;
     if (!is_in_image(&ws->gradient, x, y)) return false;
@@ -264,7 +265,6 @@ static void fit_places(oc_judoca_ws_t *ws)
                                   .t_b = ws->stats.t_b,
                                   .cos_min_angle = (float)cos((double)p->min_angle_rad),
                                   .cos_min_bend = (float)cos((double)p->min_bend_rad),
-                                  .min_bend_rad = p->min_bend_rad,
                                   .cos_first_bend = (float)cos(FIRST_BEND_SHARE * (double)p->min_bend_rad),
                                   .ring = ws->ring,
                                   .max_rms_px = p->max_rms_px,

@@ -27,7 +27,7 @@ typedef struct oc_fit_rules {
     float lambda_px, lambda_min_px;
     float s_j;
     float t_b; /* in force, grey levels per px */
-    float cos_min_angle, cos_min_bend, min_bend_rad;
+    float cos_min_angle, cos_min_bend;
     float cos_first_bend;        /* a line already at the first look */
     const oc_ring_table_t *ring; /* [2] near the apex and further out */
     float max_rms_px, max_apex_sigma_px;

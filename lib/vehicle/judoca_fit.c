@@ -5,6 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/angle.h"
+
 #define PI 3.14159265358979f
 
 /* A branch is fitted over at least this length. */
@@ -398,38 +400,15 @@ void oc_judoca_sort_branches(oc_junction_t *junction)
     }
 }
 
-void oc_judoca_set_kind(oc_junction_t *junction, float tolerance_rad)
+/* In [0, 2 pi). */
+static float branch_angle(float ux, float uy)
 {
-    static const uint8_t by_count[5] = {OC_KIND_OTHER, OC_KIND_OTHER, OC_KIND_L, OC_KIND_Y, OC_KIND_X};
-    const uint32_t n = junction->n_branches;
-    junction->kind = n < 5 ? by_count[n] : OC_KIND_OTHER;
-    if (n != 3) return;
-
-    for (uint32_t i = 0; i < 3; i++) {
-        float between = fabsf(junction->branch[i].angle_rad - junction->branch[(i + 1) % 3].angle_rad);
-        if (fabsf(PI - between) < tolerance_rad) junction->kind = OC_KIND_T;
-    }
+    const float angle = oc_angle_of(uy, ux);
+    const float positive = angle < 0.0f ? angle + 2.0f * PI : angle;
+    return positive < 2.0f * PI ? positive : 0.0f;
 }
 
-/* Gregory's series of the half angle: z <= tan(22.5 deg), so nine terms leave 1e-8. libm's arctangent may differ in
- * the last bit from machine to machine. */
-float oc_judoca_angle(float x, float y)
-{
-    const double ax = fabs((double)x), ay = fabs((double)y);
-    const double high = ax > ay ? ax : ay, low = ax > ay ? ay : ax;
-    const double h = high + sqrt(high * high + low * low);
-    const double z = h > 0.0 ? low / h : 0.0, z2 = z * z;
-    double sum = 1.0 / 17.0;
-    for (int k = 15; k >= 1; k -= 2) sum = 1.0 / k - z2 * sum;
-    double angle = 2.0 * z * sum;
-    if (ay > ax) angle = 1.5707963267948966 - angle;
-    if (x < 0.0f) angle = 3.141592653589793 - angle;
-    if (y < 0.0f) angle = 6.283185307179586 - angle;
-    const float rounded = (float)angle;
-    return rounded < 2.0f * PI ? rounded : 0.0f;
-}
-
-static void fit_write(const oc_fit_t *fit, float score, float tolerance_rad, oc_junction_t *junction)
+static void fit_write(const oc_fit_t *fit, float score, oc_junction_t *junction)
 {
     memset(junction, 0, sizeof *junction);
     junction->x_px = fit->x_px;
@@ -438,10 +417,10 @@ static void fit_write(const oc_fit_t *fit, float score, float tolerance_rad, oc_
     for (uint32_t i = 0; i < fit->n && i < OC_MAX_BRANCHES; i++) {
         const oc_fit_branch_t *b = &fit->branch[i];
         junction->branch[junction->n_branches++] =
-            (oc_branch_t){oc_judoca_angle(b->ux, b->uy), b->length_px, smaller(b->share, 1.0f)};
+            (oc_branch_t){branch_angle(b->ux, b->uy), b->length_px, smaller(b->share, 1.0f)};
     }
     oc_judoca_sort_branches(junction);
-    oc_judoca_set_kind(junction, tolerance_rad);
+    junction->kind = (uint8_t)oc_junction_kind_of(junction->branch, junction->n_branches);
 }
 
 bool oc_judoca_fit_finish(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, oc_fit_t *fit,
@@ -466,6 +445,6 @@ bool oc_judoca_fit_finish(const oc_gradient_t *gradient, const oc_fit_rules_t *r
 
     const float score = fit_score(fit, rules->cos_min_bend);
     if (!(score > 0.0f)) return false;
-    fit_write(fit, score, rules->min_bend_rad, junction);
+    fit_write(fit, score, junction);
     return true;
 }

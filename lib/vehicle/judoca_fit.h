@@ -38,13 +38,6 @@ bool oc_judoca_fit_finish(const oc_gradient_t *gradient, const oc_fit_rules_t *r
 /* Sort the branches by angle. */
 void oc_judoca_sort_branches(oc_junction_t *junction);
 
-/* Angle of a vector, [0, 2 pi), to 1e-7 rad; the same bits on every machine. */
-float oc_judoca_angle(float x, float y);
-
-/* Set `kind` from n_branches and angles: of three branches it is a T when two
- * are opposite within tolerance_rad. */
-void oc_judoca_set_kind(oc_junction_t *junction, float tolerance_rad);
-
 #ifdef __cplusplus
 }
 #endif

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/angle.h"
 #include "vehicle/judoca_fit.h"
 
 /* Bits of the padded map. Grown means: here or one pixel aside, up/down for
@@ -69,7 +70,8 @@ static void ray_fill(thesis_ray_t *ray, int32_t x, int32_t y, float s_j, int32_t
     const int32_t ax = x < 0 ? -x : x, ay = y < 0 ? -y : y, steps = ax > ay ? ax : ay;
 
     memset(ray, 0, sizeof *ray);
-    ray->angle_rad = oc_judoca_angle((float)x, (float)y);
+    const float angle = oc_angle_of((float)y, (float)x);
+    ray->angle_rad = angle < 0.0f ? angle + 2.0f * PI : angle;
     ray->is_flat = ax >= ay;
     for (int32_t i = steps; i > 0; i--) {
         const float part = (float)i / (float)steps;
@@ -311,7 +313,7 @@ void oc_judoca_thesis_find(oc_judoca_ws_t *ws)
         j->n_branches = (uint8_t)thesis_branches(ws, t->map + at, j->branch);
         j->score = thesis_strength(ws, j->branch, j->n_branches);
         oc_judoca_sort_branches(j);
-        oc_judoca_set_kind(j, ws->params.min_bend_rad);
+        j->kind = (uint8_t)oc_junction_kind_of(j->branch, j->n_branches);
     }
     ws->stats.n_found = ws->stats.n_fitted;
 }

@@ -5,7 +5,7 @@
 #include <stdio.h>
 
 #include "packet_examples.h"
-#include "packet_target.h"
+#include "fuzz_target.h"
 
 static example_packet_t packets[N_EXAMPLES];
 

@@ -10,7 +10,7 @@
 
 #include "core/packet_internal.h"
 #include "packet_any.h"
-#include "packet_target.h"
+#include "fuzz_target.h"
 
 #define REQUIRE(id, condition)                                                                                         \
     do {                                                                                                               \

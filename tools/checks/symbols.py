@@ -23,6 +23,7 @@ ALLOWED = re.compile(
     r"|(?:" + "|".join(LIBM) + r")f?"
     r"|(?:__)?(?:memcpy|memmove|memset)(?:_chk)?|memcmp|memchr"
     r"|__assert_fail|__stack_chk_fail|_GLOBAL_OFFSET_TABLE_"
+    r"|__cpu_model|__cpu_indicator_init"  # which instructions there are
     r"|__(?:u?div|u?mod|mul|popcount|clz|ctz|ashl|ashr|lshr)[sdt]i[234])")  # libgcc
 READ_ONLY = re.compile(r"\.(?:text|rodata|data\.rel\.ro|eh_frame|note)")
 

@@ -1,11 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # What comes from outside: Debian's packages, and LCM and Unity out of third_party/ (tools/setup.sh puts them there).
 set(OUTCROP_THIRD_PARTY ${CMAKE_SOURCE_DIR}/third_party)
-foreach(piece lcm/lib/liblcm.a unity/unity.c)
+set(pieces unity/unity.c)
+if(NOT OUTCROP_VEHICLE_ONLY)
+  list(APPEND pieces lcm/lib/liblcm.a)
+endif()
+foreach(piece ${pieces})
   if(NOT EXISTS ${OUTCROP_THIRD_PARTY}/${piece})
     message(FATAL_ERROR "third_party/${piece} is missing: run tools/setup.sh first")
   endif()
 endforeach()
+
+# ---- the tests' of the vehicle's half, which needs nothing else
+add_library(unity STATIC ${OUTCROP_THIRD_PARTY}/unity/unity.c)
+target_include_directories(unity SYSTEM PUBLIC ${OUTCROP_THIRD_PARTY}/unity)
+target_compile_definitions(unity PUBLIC UNITY_INCLUDE_DOUBLE)
+if(OUTCROP_VEHICLE_ONLY)
+  return()
+endif()
 
 find_package(Threads REQUIRED)
 find_package(PkgConfig REQUIRED)
@@ -41,8 +53,5 @@ foreach(module calib3d features2d imgcodecs imgproc core)
   target_link_libraries(outcrop_opencv INTERFACE ${OUTCROP_OPENCV_${module}})
 endforeach()
 
-# ---- the tests'
+# ---- the other tests'
 find_package(GTest REQUIRED)
-add_library(unity STATIC ${OUTCROP_THIRD_PARTY}/unity/unity.c)
-target_include_directories(unity SYSTEM PUBLIC ${OUTCROP_THIRD_PARTY}/unity)
-target_compile_definitions(unity PUBLIC UNITY_INCLUDE_DOUBLE)

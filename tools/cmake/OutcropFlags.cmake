@@ -28,6 +28,13 @@ if(OUTCROP_SANITIZE)
   add_link_options(-fsanitize=address,undefined)
 endif()
 
+option(OUTCROP_FUZZ "everything instrumented for libFuzzer, which needs clang; only the fuzzers are built" OFF)
+if(OUTCROP_FUZZ)
+  set(CMAKE_C_FLAGS_RELEASE "-O1 -g")
+  add_compile_options(-fsanitize=fuzzer-no-link,address,undefined,float-cast-overflow -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=address,undefined)
+endif()
+
 option(OUTCROP_CCACHE "compile through ccache where it is installed" ON)
 find_program(OUTCROP_CCACHE_PROGRAM ccache)
 if(OUTCROP_CCACHE AND OUTCROP_CCACHE_PROGRAM)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause
- * The entry point that libFuzzer and the replay share. */
-#ifndef OUTCROP_TESTS_PACKET_TARGET_H
-#define OUTCROP_TESTS_PACKET_TARGET_H
+ * The entry point that libFuzzer and the replays share. */
+#ifndef OUTCROP_TESTS_FUZZ_TARGET_H
+#define OUTCROP_TESTS_FUZZ_TARGET_H
 
 #include <stddef.h>
 #include <stdint.h>
