@@ -195,18 +195,34 @@ static bool seeds_bend(const oc_fit_seed_t seed[], uint32_t n)
 
 /* ---- fit ---- */
 
-/* Lowest prescore still fitted: as many of the best as max_candidates allows,
- * those of equal score all or none, so that the choice does not depend on where
- * in the image a place lies. */
-static uint32_t places_lowest(const oc_judoca_ws_t *ws, uint32_t n)
-{
-    if (n <= ws->params.max_candidates) return 0;
+/* Prescores are compared in this many steps. */
+#define PRESCORE_BINS 1024u
 
-    uint32_t histogram[1024] = {0};
-    for (uint32_t i = 0; i < n; i++) histogram[ws->search.place[i].prescore >> 6]++;
-    uint32_t bin = 1024, sum = 0;
-    while (bin > 0 && sum + histogram[bin - 1] <= ws->params.max_candidates) sum += histogram[--bin];
-    return bin << 6;
+/* Which places are fitted when there are more than max_candidates: all above
+ * a bin of the prescore, and of that bin an even share in their order. */
+typedef struct places_choice {
+    uint32_t bin;      /* the one that is shared */
+    uint32_t n, quota; /* places in it, and how many of them are taken */
+    uint32_t met;
+} places_choice_t;
+
+static places_choice_t places_choose(const oc_judoca_ws_t *ws, uint32_t n)
+{
+    const uint32_t limit = ws->params.max_candidates;
+    uint32_t histogram[PRESCORE_BINS] = {0};
+    for (uint32_t i = 0; i < n; i++) histogram[ws->search.place[i].prescore / (65536u / PRESCORE_BINS)]++;
+    uint32_t bin = PRESCORE_BINS - 1u, sum = 0;
+    while (bin > 0 && sum + histogram[bin] <= limit) sum += histogram[bin--];
+    const uint32_t room = limit - sum;
+    return (places_choice_t){bin, histogram[bin], histogram[bin] < room ? histogram[bin] : room, 0};
+}
+
+static bool places_take(places_choice_t *choice, const oc_place_t *place)
+{
+    const uint32_t bin = place->prescore / (65536u / PRESCORE_BINS);
+    if (bin != choice->bin) return bin > choice->bin;
+    const uint64_t i = choice->met++;
+    return i * choice->quota / choice->n != (i + 1u) * choice->quota / choice->n;
 }
 
 static bool is_in_image(const oc_gradient_t *gradient, float x, float y)
@@ -272,9 +288,9 @@ static void fit_places(oc_judoca_ws_t *ws)
     const oc_gradient_t *g = &ws->gradient;
     memset(ws->done, 0, oc_bitmap_words(g->width_px, g->height_px) * sizeof ws->done[0]);
     const uint32_t n = ws->search.n_places < ws->search.max_places ? ws->search.n_places : ws->search.max_places;
-    const uint32_t lowest = places_lowest(ws, n);
+    places_choice_t choice = places_choose(ws, n);
     for (uint32_t i = 0; i < n && ws->stats.n_found < OC_JUDOCA_MAX_FOUND; i++) {
-        if (ws->search.place[i].prescore < lowest) continue;
+        if (!places_take(&choice, &ws->search.place[i])) continue;
         ws->stats.n_fitted++;
         if (fit_place(ws, &rules, &ws->search.place[i])) ws->stats.n_found++;
     }

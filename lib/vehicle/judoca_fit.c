@@ -54,7 +54,7 @@
 #define FLOOR_SIGMA_PX 0.03f
 
 /* Contrast at which the score reaches one half, grey levels per px. */
-#define HALF_CONTRAST 6.0f
+#define HALF_CONTRAST 20.0f
 
 /* libm's take NaN into account and are calls. */
 static inline float larger(float a, float b)

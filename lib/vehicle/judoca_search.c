@@ -22,8 +22,8 @@
 #define BAND_PX 64u
 
 /* A cluster reaches this far from its first pixel: to each side, and down. */
-#define CLUSTER_SIDE_PX 4
-#define CLUSTER_DOWN_PX 6u
+#define CLUSTER_SIDE_PX 2
+#define CLUSTER_DOWN_PX 3u
 
 /* One place per this many pixels at most. */
 #define PX_PER_PLACE 16u
