@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// outcrop-bench-ground: the ground filter against truth, the thesis' table 4.1, and the clock.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+
+#include "labels.h"
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+void write_json(const std::string &file, const Json &json)
+{
+    if (file.empty()) return;
+    std::ofstream out(file);
+    out << json.dump(1) << '\n';
+    if (!out.flush()) throw std::runtime_error(file + ": cannot be written");
+}
+
+} // namespace
+
+int main(int argc, char **argv)
+{
+    CLI::App app("The ground filter on site folders, without a link.", "outcrop-bench-ground");
+    app.require_subcommand(1);
+    std::string json_file;
+
+    auto *labels = app.add_subcommand("labels", "labels of whole runs against the sites' truth");
+    std::vector<std::string> sites;
+    outcrop::bench::LabelOptions options;
+    labels->add_option("SITE", sites, "site folders")->required();
+    labels->add_option("--poses", options.modes, "exact, or as outcrop-drive --perturb: 1 2 3:drift");
+    labels->add_option("--images", options.images, "pictures from this folder of the site");
+    labels->add_flag("--errors", options.lists_errors, "one line per wrong label");
+    labels->add_option("--json", json_file, "also write the figures here");
+
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError &e) {
+        return app.exit(e) == 0 ? 0 : 2;
+    }
+    try {
+        Json out = Json::object();
+        if (labels->parsed()) {
+            for (const std::string &site : sites) {
+                std::printf("%s\n", site.c_str());
+                options.site = site;
+                out[site] = outcrop::bench::measure_labels(options);
+            }
+        }
+        write_json(json_file, out);
+    } catch (const std::exception &e) {
+        std::cerr << "outcrop-bench-ground: " << e.what() << '\n';
+        return 1;
+    }
+    return 0;
+}
