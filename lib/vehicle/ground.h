@@ -29,6 +29,9 @@ extern "C" {
 /* Stored views one new view is compared with. */
 #define OC_MAX_GROUND_REFERENCES 6u
 
+/* Cells of an image that overlap is counted in. */
+#define OC_GROUND_CELLS 80u
+
 /* Side of the correlation window. */
 #define OC_MAX_GROUND_WINDOW_PX 31u
 
@@ -36,15 +39,16 @@ extern "C" {
 typedef struct oc_ground_params {
     uint32_t window_px;      /* N of the N x N window, odd, 7..OC_MAX_GROUND_WINDOW_PX; default 17 */
     float t_g;               /* least correlation of a first-pass match, 0.3..1; default 0.7 */
-    float t_g_second;        /* least correlation of ground in the second pass, 0.3..1; default 0.85 */
-    float t_refuted;         /* a junction that correlates worse was not seen on the ground, 0..1; default 0.5 */
+    float t_g_second;        /* least correlation of a second-pass match, 0.3..1; default 0.85 */
+    float t_ground;          /* least evidence of a ground junction, nats, 0.5..10; default 2.5, 12 to 1 */
+    float t_obstacle;        /* least evidence against the ground of an obstacle's junction, 0.1..10; default 1 */
     float t_transfer_px;     /* t_H: symmetric transfer error of an inlier, 0.5..10; default 2 */
     double t_h_m;            /* a height that counts as ground, metres, > 0..10; default 0.02 */
     double window_chi2;      /* squared Mahalanobis radius of the first window, 1..50; default 9.21 = 99 % */
     double sigma_px;         /* error of a junction's position, 0.05..5; default 0.7 */
     uint32_t ransac_rounds;  /* at most, 10..5000; default 500 */
     uint32_t min_inliers;    /* a homography with fewer is not believed, 6..1000; default 10 */
-    uint32_t max_references; /* stored views per new view, 1..OC_MAX_GROUND_REFERENCES; default 3 */
+    uint32_t max_references; /* stored views per new view, 1..OC_MAX_GROUND_REFERENCES; default 6 */
     uint32_t max_ties;       /* per reference view, 0..OC_MAX_TIES; default 24 */
 } oc_ground_params_t;
 
@@ -58,10 +62,10 @@ typedef struct oc_ground_view {
     uint32_t n_junctions;
 } oc_ground_view_t;
 
-/* What the views compared so far say about one junction. */
+/* What the views compared so far say about one junction: evidence, in 1/256 nat, saturating. */
 typedef struct oc_ground_votes {
-    uint8_t n_ground, n_refuted;       /* pairs that said so; saturate */
-    uint8_t best_ground, best_refuted; /* strongest of them, 0..255 */
+    uint16_t best, sum; /* for the ground: of the view that says so most clearly; of all that say so */
+    uint16_t against;   /* of all that say no */
 } oc_ground_votes_t;
 
 /* A pair of junctions on the ground. */
@@ -98,8 +102,9 @@ bool oc_ground_params_are_valid(const oc_ground_params_t *params);
 
 /* How well a stored view can serve as reference, from the poses alone: share
  * of this view's ground pixels that the other sees, weighted by the angle
- * between the rays (best from 8 to 40 degrees). 0 = useless, 1 = all of it. */
-double oc_ground_overlap(const oc_camera_t *view, const oc_camera_t *reference);
+ * between the rays (best from 8 to 40 degrees). 0 = useless, 1 = all of it.
+ * worth: the same for each cell of the view's image, row by row. 20 us. */
+double oc_ground_overlap(const oc_camera_t *view, const oc_camera_t *reference, float worth[OC_GROUND_CELLS]);
 
 /* Compare a view with a reference and add to the votes of both.
  *
@@ -119,8 +124,18 @@ OC_CHECKED oc_status_t oc_ground_match_views(oc_ground_ws_t *ws, const oc_ground
                                              oc_ground_votes_t votes[], oc_ground_votes_t ref_votes[],
                                              oc_ground_result_t *result);
 
-/* Label and confidence that votes amount to. */
-void oc_ground_decide(const oc_ground_votes_t *votes, uint8_t *label, uint8_t *confidence);
+/* Count what one view says: l is its log-likelihood ratio of ground against the rest, nats; not a number counts as 0. */
+void oc_ground_vote(oc_ground_votes_t *votes, double l);
+
+/* Evidence for the ground that votes amount to, nats. Not their sum: views are
+ * not independent. What looks like ground and is not, the foot of an obstacle,
+ * looks so from everywhere; what hides a ground junction hides it from several views. */
+double oc_ground_evidence(const oc_ground_votes_t *votes);
+
+/* Label that votes amount to, and the probability that it is right, 0..255 for
+ * 0..1 when ground and the rest are equally frequent. Unknown: confidence 0. */
+void oc_ground_decide(const oc_ground_params_t *params, const oc_ground_votes_t *votes, uint8_t *label,
+                      uint8_t *confidence);
 
 /* Pick at most params->max_ties of ws->matches, best first but spread over the
  * image, and write them as ties. Returns their number. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause
  * Correlation of windows under a homography. */
 #include <math.h>
+#include <string.h>
 
 #include "core/homography.h"
 #include "vehicle/ground_internal.h"
@@ -11,9 +12,34 @@
 /* Grey levels; a flatter window correlates with anything. */
 #define MIN_SD 1.5f
 
+/* A block may differ by this share of the patch's contrast: shading, resampling. */
+#define BLOCK_NOISE 0.1f
+
+/* More of a window's variance than this is never put down to noise. */
+#define MAX_NOISE_SHARE 0.3f
+
+/* Four floats side by side. Sums are kept lane by lane and added up in one fixed
+ * order, so that every machine gets the same bits. */
+typedef float lanes_t __attribute__((vector_size(16)));
+#define N_LANES 4u
+
+static lanes_t lanes_load(const float *p)
+{
+    lanes_t v;
+    memcpy(&v, p, sizeof v);
+    return v;
+}
+
+static float lanes_sum(lanes_t v)
+{
+    return (v[0] + v[1]) + (v[2] + v[3]);
+}
+
+/* ---- reading windows ---- */
+
 /* Read the window whose sample (c, r) is at H (x + (c - half) step, ...) + shift. */
 static bool warp_window(const oc_image_t *grey, const double H[9], const double at[2], const double shift[2],
-                        int32_t half, int32_t step, float *out)
+                        int32_t half, int32_t step, float *out, uint32_t out_stride)
 {
     const float max_x = (float)(grey->width_px - 1u);
     const float max_y = (float)(grey->height_px - 1u);
@@ -25,6 +51,7 @@ static bool warp_window(const oc_image_t *grey, const double H[9], const double 
         const float bx = (float)(H[0] * at[0] + H[1] * y + H[2]);
         const float by = (float)(H[3] * at[0] + H[4] * y + H[5]);
         const float bw = (float)(H[6] * at[0] + H[7] * y + H[8]);
+        float *o = out;
         for (int32_t c = -half; c <= half; c += step) {
             const float f = (float)c;
             const float w = bw + gw * f;
@@ -37,27 +64,37 @@ static bool warp_window(const oc_image_t *grey, const double H[9], const double 
             const uint8_t *q = p + stride;
             const float top = (float)p[0] + ax * (float)(p[1] - p[0]);
             const float bottom = (float)q[0] + ax * (float)(q[1] - q[0]);
-            *out++ = top + ay * (bottom - top);
+            *o++ = top + ay * (bottom - top);
         }
+        out += out_stride;
     }
     return true;
 }
 
-/* Zero mean, unit length. Returns the standard deviation before. */
+/* Zero mean, unit length; zeros behind the samples. Returns the standard deviation before. */
 static float window_normalise(float *v, uint32_t n)
 {
-    float sum = 0.0f;
-    for (uint32_t i = 0; i < n; i++) sum += v[i];
-    const float mean = sum / (float)n;
-    float squares = 0.0f;
-    for (uint32_t i = 0; i < n; i++) {
-        v[i] -= mean;
-        squares += v[i] * v[i];
+    const uint32_t width = (n + N_LANES - 1u) / N_LANES * N_LANES;
+    lanes_t sum = {0};
+    for (uint32_t r = 0; r < n; r++) {
+        float *row = v + r * GROUND_PATCH_STRIDE;
+        for (uint32_t c = n; c < GROUND_PATCH_STRIDE; c++) row[c] = 0.0f;
+        for (uint32_t c = 0; c < width; c += N_LANES) sum += lanes_load(row + c);
     }
-    if (!(squares > 0.0f)) return 0.0f;
-    const float scale = 1.0f / sqrtf(squares);
-    for (uint32_t i = 0; i < n; i++) v[i] *= scale;
-    return sqrtf(squares / (float)n);
+    const float mean = lanes_sum(sum) / (float)(n * n);
+    lanes_t squares = {0};
+    for (uint32_t r = 0; r < n; r++) {
+        float *row = v + r * GROUND_PATCH_STRIDE;
+        for (uint32_t c = 0; c < n; c++) row[c] -= mean;
+        for (uint32_t c = 0; c < width; c += N_LANES) squares += lanes_load(row + c) * lanes_load(row + c);
+    }
+    const float length2 = lanes_sum(squares);
+    if (!(length2 > 0.0f)) return 0.0f;
+    const float scale = 1.0f / sqrtf(length2);
+    for (uint32_t r = 0; r < n; r++) {
+        for (uint32_t c = 0; c < n; c++) v[r * GROUND_PATCH_STRIDE + c] *= scale;
+    }
+    return sqrtf(length2 / (float)(n * n));
 }
 
 bool oc_ground_patch_take(const oc_image_t *grey, double x_px, double y_px, uint32_t n, ground_patch_t *patch)
@@ -66,10 +103,12 @@ bool oc_ground_patch_take(const oc_image_t *grey, double x_px, double y_px, uint
     static const double still[2] = {0, 0};
     const double at[2] = {x_px, y_px};
     patch->n = n;
-    if (!warp_window(grey, same, at, still, (int32_t)(n / 2u), 1, patch->v)) return false;
-    patch->sd = window_normalise(patch->v, n * n);
+    if (!warp_window(grey, same, at, still, (int32_t)(n / 2u), 1, patch->v, GROUND_PATCH_STRIDE)) return false;
+    patch->sd = window_normalise(patch->v, n);
     return patch->sd >= MIN_SD;
 }
+
+/* ---- one place ---- */
 
 /* Every third sample of the patch against the same of the other window. */
 static float correlate_quick(const ground_patch_t *patch, const float *sparse, uint32_t first)
@@ -78,8 +117,9 @@ static float correlate_quick(const ground_patch_t *patch, const float *sparse, u
     uint32_t count = 0;
     for (uint32_t r = first; r < patch->n; r += 3u) {
         for (uint32_t c = first; c < patch->n; c += 3u) {
-            const float a = patch->v[r * patch->n + c];
-            const float b = sparse[count++];
+            const float a = patch->v[r * GROUND_PATCH_STRIDE + c];
+            const float b = sparse[(r / 3u) * GROUND_PATCH_STRIDE + c / 3u];
+            count++;
             sa += a;
             sb += b;
             saa += a * a;
@@ -93,6 +133,18 @@ static float correlate_quick(const ground_patch_t *patch, const float *sparse, u
     return (sab - sa * sb / n) / sqrtf(va * vb);
 }
 
+/* Product of a patch with the window of the same size whose first sample is b. */
+static float window_product(const ground_patch_t *patch, const float *b, uint32_t b_stride)
+{
+    const uint32_t width = (patch->n + N_LANES - 1u) / N_LANES * N_LANES;
+    lanes_t sum = {0};
+    for (uint32_t r = 0; r < patch->n; r++) {
+        const float *p = patch->v + r * GROUND_PATCH_STRIDE, *q = b + r * b_stride;
+        for (uint32_t c = 0; c < width; c += N_LANES) sum += lanes_load(p + c) * lanes_load(q + c);
+    }
+    return lanes_sum(sum);
+}
+
 float oc_ground_correlate(const ground_patch_t *patch, const double at[2], const oc_image_t *grey, const double H[9],
                           const double to[2])
 {
@@ -102,38 +154,43 @@ float oc_ground_correlate(const ground_patch_t *patch, const double at[2], const
 
     const int32_t half = (int32_t)(patch->n / 2u);
     const int32_t sparse_half = half - half % 3;
-    float window[OC_MAX_GROUND_WINDOW_PX * OC_MAX_GROUND_WINDOW_PX];
-    if (!warp_window(grey, H, at, shift, sparse_half, 3, window)) return -1.0f;
+    float window[OC_MAX_GROUND_WINDOW_PX * GROUND_PATCH_STRIDE];
+    if (!warp_window(grey, H, at, shift, sparse_half, 3, window, GROUND_PATCH_STRIDE)) return -1.0f;
     if (correlate_quick(patch, window, (uint32_t)(half - sparse_half)) < QUICK_NCC) return -1.0f;
 
-    if (!warp_window(grey, H, at, shift, half, 1, window)) return -1.0f;
-    const uint32_t n = patch->n * patch->n;
-    if (window_normalise(window, n) < MIN_SD) return -1.0f;
-    float ncc = 0.0f;
-    for (uint32_t i = 0; i < n; i++) ncc += patch->v[i] * window[i];
-    return ncc;
+    if (!warp_window(grey, H, at, shift, half, 1, window, GROUND_PATCH_STRIDE)) return -1.0f;
+    if (window_normalise(window, patch->n) < MIN_SD) return -1.0f;
+    return window_product(patch, window, GROUND_PATCH_STRIDE);
 }
 
-/* Correlation of the patch with the n x n window of a wider one whose corner is at (c, r). */
-static float correlate_at(const ground_patch_t *patch, const float *wide, uint32_t wide_n, uint32_t c, uint32_t r,
-                          float *sd)
+/* ---- looking a patch up ---- */
+
+enum { SIDE = 2 * GROUND_SEARCH_PX + 1 };
+
+/* Variance, times n^2, of every n x n window of the wide one; in place of sums over each anew. */
+static void window_variances(const float *wide, uint32_t n, float out[SIDE][SIDE])
 {
-    const uint32_t n = patch->n;
-    float sum = 0.0f, squares = 0.0f, product = 0.0f;
-    for (uint32_t y = 0; y < n; y++) {
-        const float *a = patch->v + y * n;
-        const float *b = wide + (r + y) * wide_n + c;
-        for (uint32_t x = 0; x < n; x++) {
-            sum += b[x];
-            squares += b[x] * b[x];
-            product += a[x] * b[x];
+    for (uint32_t r = 0; r < SIDE; r++) {
+        float sum[GROUND_WIDE_STRIDE] = {0}, squares[GROUND_WIDE_STRIDE] = {0}; /* of columns */
+        for (uint32_t y = r; y < r + n; y++) {
+            const float *row = wide + y * GROUND_WIDE_STRIDE;
+            for (uint32_t c = 0; c < GROUND_WIDE_STRIDE; c++) {
+                sum[c] += row[c];
+                squares[c] += row[c] * row[c];
+            }
+        }
+        float s = 0.0f, q = 0.0f;
+        for (uint32_t c = 0; c < n; c++) {
+            s += sum[c];
+            q += squares[c];
+        }
+        for (uint32_t c = 0; c < SIDE; c++) {
+            out[r][c] = q - s * s / (float)(n * n);
+            if (c + 1 == SIDE) break;
+            s += sum[c + n] - sum[c];
+            q += squares[c + n] - squares[c];
         }
     }
-    const float count = (float)(n * n);
-    const float variance = squares / count - (sum / count) * (sum / count);
-    if (!(variance > MIN_SD * MIN_SD)) return -1.0f;
-    *sd = sqrtf(variance);
-    return product / sqrtf(variance * count); /* the patch has zero mean and unit length */
 }
 
 /* Vertex of the parabola through three values, within half a step of the middle. */
@@ -145,24 +202,32 @@ static float vertex(float before, float middle, float after)
     return v > 0.5f ? 0.5f : (v < -0.5f ? -0.5f : v);
 }
 
-void oc_ground_look_up(const ground_patch_t *patch, const double at[2], const oc_image_t *grey, const double H[9],
-                       ground_lookup_t *found)
+/* Take the mean away: sums of squares stay exact enough, and zero is what lies behind the samples. */
+static void wide_centre(float *wide, uint32_t wide_n)
 {
-    enum { SIDE = 2 * GROUND_SEARCH_PX + 1 };
-    static const double still[2] = {0, 0};
-    *found = (ground_lookup_t){.is_inside = false, .ncc = -1.0f};
+    float sum = 0.0f;
+    for (uint32_t r = 0; r < wide_n; r++) {
+        for (uint32_t c = 0; c < wide_n; c++) sum += wide[r * GROUND_WIDE_STRIDE + c];
+    }
+    const float mean = sum / (float)(wide_n * wide_n);
+    for (uint32_t r = 0; r < wide_n; r++) {
+        float *row = wide + r * GROUND_WIDE_STRIDE;
+        for (uint32_t c = 0; c < wide_n; c++) row[c] -= mean;
+        for (uint32_t c = wide_n; c < GROUND_WIDE_STRIDE; c++) row[c] = 0.0f;
+    }
+}
 
-    float wide[GROUND_MAX_WIDE_PX * GROUND_MAX_WIDE_PX];
-    const uint32_t wide_n = patch->n + 2u * GROUND_SEARCH_PX;
-    if (!warp_window(grey, H, at, still, (int32_t)(wide_n / 2u), 1, wide)) return;
-    found->is_inside = true;
-
-    float ncc[SIDE][SIDE], sd[SIDE][SIDE];
+/* Best correlation over whole pixels, and the parabolas' vertex round it. */
+static bool peak_find(const ground_patch_t *patch, const float *wide, ground_lookup_t *found)
+{
+    float ncc[SIDE][SIDE], variance[SIDE][SIDE];
+    window_variances(wide, patch->n, variance);
+    const float least = MIN_SD * MIN_SD * (float)(patch->n * patch->n);
     uint32_t best_c = GROUND_SEARCH_PX, best_r = GROUND_SEARCH_PX;
     for (uint32_t r = 0; r < SIDE; r++) {
         for (uint32_t c = 0; c < SIDE; c++) {
-            sd[r][c] = 0.0f;
-            ncc[r][c] = correlate_at(patch, wide, wide_n, c, r, &sd[r][c]);
+            const float product = window_product(patch, wide + r * GROUND_WIDE_STRIDE + c, GROUND_WIDE_STRIDE);
+            ncc[r][c] = variance[r][c] > least ? product / sqrtf(variance[r][c]) : -1.0f;
             if (ncc[r][c] > ncc[best_r][best_c]) {
                 best_c = c;
                 best_r = r;
@@ -170,13 +235,143 @@ void oc_ground_look_up(const ground_patch_t *patch, const double at[2], const oc
         }
     }
     found->ncc = ncc[best_r][best_c];
-    found->sd = sd[best_r][best_c];
-    found->dx_px = (float)best_c - GROUND_SEARCH_PX;
-    found->dy_px = (float)best_r - GROUND_SEARCH_PX;
-    if (best_c > 0 && best_c + 1 < SIDE) {
-        found->dx_px += vertex(ncc[best_r][best_c - 1], found->ncc, ncc[best_r][best_c + 1]);
+    found->shift_px[0] = (float)best_c - GROUND_SEARCH_PX;
+    found->shift_px[1] = (float)best_r - GROUND_SEARCH_PX;
+    if (best_c == 0 || best_c + 1 == SIDE || best_r == 0 || best_r + 1 == SIDE) return false;
+    found->shift_px[0] += vertex(ncc[best_r][best_c - 1], found->ncc, ncc[best_r][best_c + 1]);
+    found->shift_px[1] += vertex(ncc[best_r - 1][best_c], found->ncc, ncc[best_r + 1][best_c]);
+    return true;
+}
+
+/* Least squares step of the window over the patch (both normalised), and how
+ * well the answer is known: noise over contrast across both axes. */
+static bool shift_step(const ground_patch_t *patch, const float *window, float step[2], float cov[3])
+{
+    float xx = 0.0f, xy = 0.0f, yy = 0.0f, ex = 0.0f, ey = 0.0f, ee = 0.0f;
+    for (uint32_t r = 1; r + 1 < patch->n; r++) {
+        const float *a = patch->v + r * GROUND_PATCH_STRIDE, *b = window + r * GROUND_PATCH_STRIDE;
+        for (uint32_t c = 1; c + 1 < patch->n; c++) {
+            const float gx = 0.5f * (b[c + 1] - b[c - 1]);
+            const float gy = 0.5f * (b[c + GROUND_PATCH_STRIDE] - (b - GROUND_PATCH_STRIDE)[c]);
+            const float e = a[c] - b[c];
+            xx += gx * gx;
+            xy += gx * gy;
+            yy += gy * gy;
+            ex += gx * e;
+            ey += gy * e;
+            ee += e * e;
+        }
     }
-    if (best_r > 0 && best_r + 1 < SIDE) {
-        found->dy_px += vertex(ncc[best_r - 1][best_c], found->ncc, ncc[best_r + 1][best_c]);
+    const float det = xx * yy - xy * xy;
+    if (!(det > 1e-6f * (xx + yy) * (xx + yy))) return false;
+    step[0] = (yy * ex - xy * ey) / det;
+    step[1] = (xx * ey - xy * ex) / det;
+    const float side = (float)(patch->n - 2u);
+    const float variance = ee / (side * side);
+    cov[0] = variance * yy / det;
+    cov[1] = -variance * xy / det;
+    cov[2] = variance * xx / det;
+    return true;
+}
+
+/* The window is cut into ninths. A corner of the ground agrees all round; at the
+ * foot or the rim of an obstacle one side does not, however well the rest does.
+ * 1 - (difference over the contrast of both and of the noise), the worst of nine. */
+static float blocks_worst(const ground_patch_t *patch, const float *window, float noise_sd)
+{
+    const float floor_sd = MIN_SD + BLOCK_NOISE * patch->sd;
+    const float floor2 = floor_sd * floor_sd + 0.5f * noise_sd * noise_sd;
+    const float noise2 = floor2 / (patch->sd * patch->sd * (float)(patch->n * patch->n));
+    float worst = 1.0f;
+    for (uint32_t k = 0; k < 9; k++) {
+        const uint32_t r0 = patch->n * (k / 3u) / 3u, r1 = patch->n * (k / 3u + 1u) / 3u;
+        const uint32_t c0 = patch->n * (k % 3u) / 3u, c1 = patch->n * (k % 3u + 1u) / 3u;
+        float a1 = 0.0f, a2 = 0.0f, b1 = 0.0f, b2 = 0.0f, e2 = 0.0f;
+        for (uint32_t r = r0; r < r1; r++) {
+            for (uint32_t c = c0; c < c1; c++) {
+                const float a = patch->v[r * GROUND_PATCH_STRIDE + c], b = window[r * GROUND_PATCH_STRIDE + c];
+                a1 += a;
+                b1 += b;
+                a2 += a * a;
+                b2 += b * b;
+                e2 += (a - b) * (a - b);
+            }
+        }
+        const float count = (float)((r1 - r0) * (c1 - c0));
+        const float contrast = a2 - a1 * a1 / count + b2 - b1 * b1 / count;
+        const float agreement = 1.0f - e2 / (contrast + 2.0f * count * noise2);
+        if (agreement < worst) worst = agreement;
     }
+    return worst;
+}
+
+/* From the peak over whole pixels to a fraction of one, by least squares; and
+ * how the window agrees there. window: scratch. */
+static void shift_refine(const ground_patch_t *patch, const double at[2], const oc_image_t *grey, const double H[9],
+                         float noise_sd, float *window, ground_lookup_t *found)
+{
+    static const double still[2] = {0, 0};
+    float step[2] = {0.0f, 0.0f};
+    for (int round = 0; round < 2; round++) {
+        const double there[2] = {at[0] + (double)found->shift_px[0], at[1] + (double)found->shift_px[1]};
+        if (!warp_window(grey, H, there, still, (int32_t)(patch->n / 2u), 1, window, GROUND_PATCH_STRIDE)) return;
+        if (window_normalise(window, patch->n) < MIN_SD) return;
+        const float ncc = window_product(patch, window, GROUND_PATCH_STRIDE);
+        if (round > 0 && ncc < found->ncc) { /* a step too far */
+            found->shift_px[0] -= step[0];
+            found->shift_px[1] -= step[1];
+            return;
+        }
+        found->ncc = ncc;
+        found->worst_block = blocks_worst(patch, window, noise_sd);
+        if (!shift_step(patch, window, step, found->cov_px2)) return;
+        if (round == 1 || !(fabsf(step[0]) <= 0.7f && fabsf(step[1]) <= 0.7f)) return;
+        found->shift_px[0] += step[0];
+        found->shift_px[1] += step[1];
+    }
+}
+
+void oc_ground_look_up(const ground_patch_t *patch, const double at[2], const oc_image_t *grey, const double H[9],
+                       double noise_sd, ground_lookup_t *found)
+{
+    static const double still[2] = {0, 0};
+    *found = (ground_lookup_t){.is_inside = false, .ncc = -1.0f, .worst_block = -1.0f};
+
+    float wide[GROUND_MAX_WIDE_PX * GROUND_WIDE_STRIDE];
+    const uint32_t wide_n = patch->n + 2u * GROUND_SEARCH_PX;
+    if (!warp_window(grey, H, at, still, (int32_t)(wide_n / 2u), 1, wide, GROUND_WIDE_STRIDE)) return;
+    found->is_inside = true;
+    wide_centre(wide, wide_n);
+    found->is_at_border = !peak_find(patch, wide, found);
+    if (!found->is_at_border) shift_refine(patch, at, grey, H, (float)noise_sd, wide, found);
+
+    /* Noise in both windows lowers the correlation of what is the same. */
+    const float share = 0.5f * (float)(noise_sd * noise_sd) / (patch->sd * patch->sd);
+    const float ncc = found->ncc / (1.0f - (share < MAX_NOISE_SHARE ? share : MAX_NOISE_SHARE));
+    found->ncc = ncc < 1.0f ? ncc : 1.0f;
+}
+
+/* ---- noise ---- */
+
+#define NOISE_BINS 512u
+
+double oc_ground_noise_sd(const oc_image_t *grey)
+{
+    /* The mask 1 -2 1, -2 4 -2, 1 -2 1 sees no slope and no edge along an axis; noise of standard deviation s makes
+     * it 6 s. The lower third of what it gives comes from where there is nothing else. */
+    uint32_t count[NOISE_BINS] = {0}, n = 0;
+    for (uint32_t y = 1; y + 1 < grey->height_px; y += 3u) {
+        const uint8_t *q = grey->px + (size_t)y * grey->stride_bytes;
+        const uint8_t *p = q - grey->stride_bytes, *r = q + grey->stride_bytes;
+        for (uint32_t x = 1; x + 1 < grey->width_px; x += 3u) {
+            const int32_t v = p[x - 1] - 2 * p[x] + p[x + 1] - 2 * q[x - 1] + 4 * q[x] - 2 * q[x + 1] + r[x - 1] -
+                              2 * r[x] + r[x + 1];
+            const uint32_t size = (uint32_t)(v < 0 ? -v : v);
+            count[size < NOISE_BINS ? size : NOISE_BINS - 1u]++;
+            n++;
+        }
+    }
+    uint32_t below = 0, bin = 0;
+    while (bin + 1u < NOISE_BINS && 10u * (below + count[bin]) < 3u * n) below += count[bin++];
+    return bin / (6.0 * 0.3853); /* 30 % of a normal lie within 0.3853 s */
 }

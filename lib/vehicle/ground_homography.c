@@ -445,23 +445,22 @@ bool oc_ground_refit(oc_ground_ws_t *ws, const oc_ground_params_t *params, const
     return true;
 }
 
-double oc_ground_transfer_sigma_px(const ground_pair_t *pair, double x_px, double y_px)
+bool oc_ground_transfer_covariance(const ground_pair_t *pair, double x_px, double y_px, double cov_px2[3])
 {
     double to[2], J[GROUND_PARAMS][2];
-    if (!transfer_jacobian(pair, x_px, y_px, to, J)) return (double)INFINITY;
-    double xx = 0.0, xy = 0.0, yy = 0.0;
+    if (!transfer_jacobian(pair, x_px, y_px, to, J)) return false;
+    cov_px2[0] = cov_px2[1] = cov_px2[2] = 0.0;
     for (int p = 0; p < GROUND_PARAMS; p++) {
         double sx = 0.0, sy = 0.0;
         for (int q = 0; q < GROUND_PARAMS; q++) {
             sx += pair->cov[p][q] * J[q][0];
             sy += pair->cov[p][q] * J[q][1];
         }
-        xx += J[p][0] * sx;
-        xy += J[p][0] * sy;
-        yy += J[p][1] * sy;
+        cov_px2[0] += J[p][0] * sx;
+        cov_px2[1] += J[p][0] * sy;
+        cov_px2[2] += J[p][1] * sy;
     }
-    const double half = 0.5 * (xx + yy);
-    return sqrt(half + sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy));
+    return true;
 }
 
 oc_status_t oc_ground_rise(const ground_pair_t *pair, double x_px, double y_px, double z_m, double rise_px[2])

@@ -35,8 +35,8 @@ void oc_ground_refine(oc_ground_ws_t *ws, const oc_ground_params_t *params, cons
 bool oc_ground_refit(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
                      const oc_ground_view_t *reference, ground_pair_t *pair, oc_ground_result_t *result);
 
-/* Standard deviation of a left pixel's transfer after the fit, the larger axis, right pixels. */
-double oc_ground_transfer_sigma_px(const ground_pair_t *pair, double x_px, double y_px);
+/* Covariance (xx, xy, yy) of a left pixel's transfer after the fit, right pixels. False when it is at infinity. */
+bool oc_ground_transfer_covariance(const ground_pair_t *pair, double x_px, double y_px, double cov_px2[3]);
 
 /* Move of the right pixel, px, when the point seen at a left pixel rises from the ground to
  * height z_m. OC_E_DEGENERATE when there is no such point in front of both. */
@@ -45,14 +45,19 @@ OC_CHECKED oc_status_t oc_ground_rise(const ground_pair_t *pair, double x_px, do
 
 /* ---- correlation (ground_correlate.c) ---- */
 
+/* Floats in a row of a patch, and of the wider window it is sought in: whole
+ * lanes, zero behind the samples. */
+#define GROUND_PATCH_STRIDE 32u
+#define GROUND_WIDE_STRIDE 40u
+
 /* A square window of n x n samples, n odd, of zero mean and unit length. */
 typedef struct ground_patch {
     uint32_t n;
-    float sd; /* standard deviation before, grey levels */
-    float v[OC_MAX_GROUND_WINDOW_PX * OC_MAX_GROUND_WINDOW_PX];
+    float sd; /* before normalisation, grey levels */
+    float v[OC_MAX_GROUND_WINDOW_PX * GROUND_PATCH_STRIDE];
 } ground_patch_t;
 
-/* The image's own window round (x, y). False when it does not fit inside. */
+/* The image's own window round (x, y). False when it does not fit inside or is flat. */
 bool oc_ground_patch_take(const oc_image_t *grey, double x_px, double y_px, uint32_t n, ground_patch_t *patch);
 
 /* Correlation of a patch, taken round `at`, with the image that H' leads to
@@ -64,12 +69,35 @@ float oc_ground_correlate(const ground_patch_t *patch, const double at[2], const
 /* Where a patch is best found round the place H sends it to. */
 typedef struct ground_lookup {
     bool is_inside;     /* the sought window was wholly inside */
+    bool is_at_border;  /* the peak is at the end of the search: no shift and no blocks */
     float ncc;          /* at the peak */
-    float sd;           /* of the sought window there, grey levels */
-    float dx_px, dy_px; /* peak from the expected place, pixels of the patch's own image, sub-pixel */
+    float worst_block;  /* agreement of the window's worst ninth with its own contrast, <= 1 */
+    float shift_px[2];  /* peak from the expected place, pixels of the patch's own image, sub-pixel */
+    float cov_px2[3];   /* of the shift, from the picture alone: xx, xy, yy */
 } ground_lookup_t;
 
+/* noise_sd: of both images together, grey levels; lifts the correlation to what it would be without noise. */
 void oc_ground_look_up(const ground_patch_t *patch, const double at[2], const oc_image_t *grey, const double H[9],
-                       ground_lookup_t *found);
+                       double noise_sd, ground_lookup_t *found);
+
+/* Standard deviation of the noise of an image, grey levels, from its flatter parts. */
+double oc_ground_noise_sd(const oc_image_t *grey);
+
+/* ---- judging single junctions (ground_judge.c) ---- */
+
+/* One direction of a refined pair. */
+typedef struct sight {
+    const oc_ground_view_t *from, *to;
+    const ground_pair_t *pair;    /* from -> to */
+    const ground_pair_t *forward; /* the pair as it was fitted */
+    const double *H, *H_inv;      /* of pair */
+    bool is_reverse;              /* forward's own left is `to` */
+    double noise_sd;              /* of both images together */
+} sight_t;
+
+/* What this look says of the point at a pixel of `from`: the log-likelihood
+ * ratio of ground against the rest, natural logarithm. False when nothing can
+ * be said: outside, too oblique, place not known. */
+bool oc_ground_judge(const sight_t *s, const oc_ground_params_t *params, const double at[2], double *l);
 
 #endif

@@ -11,12 +11,6 @@
 /* Pairs correlated in one pass; keeps the time of absurdly wide margins bounded. */
 #define MAX_CANDIDATES 60000u
 
-/* A pair that cannot tell this many times t_h from the ground does not judge. */
-#define MAX_BLIND_HEIGHT 5.0
-
-/* Areas that differ by more are not the same texture any more. */
-#define MAX_AREA_RATIO 9.0
-
 #define NO_MATCH UINT16_MAX
 
 /* ---- pairing junctions ---- */
@@ -116,104 +110,19 @@ static uint32_t pair_up(oc_ground_ws_t *ws, const oc_ground_params_t *params, co
     return n_candidates;
 }
 
-/* ---- judging single junctions ---- */
+/* ---- votes ---- */
 
-typedef enum verdict { VERDICT_NONE, VERDICT_GROUND, VERDICT_REFUTED } verdict_t;
-
-/* One direction of a refined pair. */
-typedef struct sight {
-    const oc_ground_view_t *from, *to;
-    const ground_pair_t *pair; /* from -> to */
-    const double *H, *H_inv;
-    bool is_reverse; /* pair's own left is `to` */
-} sight_t;
-
-/* Standard deviation of the expected place, pixels of `to`. */
-static double place_sigma_px(const sight_t *s, const ground_pair_t *forward, const double at[2], const double to[2],
-                             double area)
-{
-    if (!s->is_reverse) return oc_ground_transfer_sigma_px(forward, at[0], at[1]);
-    return oc_ground_transfer_sigma_px(forward, to[0], to[1]) * sqrt(area);
-}
-
-static bool agrees_back(const sight_t *s, const oc_ground_params_t *params, const double at[2],
-                        const ground_lookup_t *found)
-{
-    double to[2];
-    ground_patch_t patch;
-    if (oc_homography_apply(s->H, at[0] + (double)found->dx_px, at[1] + (double)found->dy_px, &to[0], &to[1]) == 0.0) {
-        return false;
-    }
-    if (!oc_ground_patch_take(&s->to->grey, to[0], to[1], params->window_px, &patch)) return false;
-    return oc_ground_correlate(&patch, to, &s->from->grey, s->H_inv, at) >= params->t_g_second;
-}
-
-/* The place where the patch was found, off_px from where the ground would be,
- * means a height: near enough to 0, and known well enough to mean it? */
-static bool is_at_height_0(const sight_t *s, const oc_ground_params_t *params, const double at[2],
-                           const double off_px[2], double sigma_px)
-{
-    double rise_px[2]; /* for a height of t_h */
-    if (!(hypot(off_px[0], off_px[1]) <= (double)params->t_transfer_px)) return false;
-    if (oc_ground_rise(s->pair, at[0], at[1], params->t_h_m, rise_px) != OC_OK) return false;
-    const double rise2 = rise_px[0] * rise_px[0] + rise_px[1] * rise_px[1];
-    if (!(rise2 > 0.0)) return false;
-    const double height = (off_px[0] * rise_px[0] + off_px[1] * rise_px[1]) / rise2; /* in units of t_h */
-    const double doubt = 2.58 * hypot(sigma_px, params->sigma_px) / sqrt(rise2);
-    return doubt <= MAX_BLIND_HEIGHT && (fabs(height) <= 1.0 || fabs(height) <= doubt);
-}
-
-static verdict_t judge(const sight_t *s, const ground_pair_t *forward, const oc_ground_params_t *params,
-                       const oc_junction_t *junction, uint8_t *strength)
-{
-    const double at[2] = {(double)junction->x_px, (double)junction->y_px};
-    double to[2], J[4];
-    if (!(oc_homography_apply(s->H, at[0], at[1], &to[0], &to[1]) > 0.0)) return VERDICT_NONE;
-    if (oc_homography_jacobian(s->H, at[0], at[1], J) != OC_OK) return VERDICT_NONE;
-    const double area = J[0] * J[3] - J[1] * J[2];
-    if (!(area < MAX_AREA_RATIO && area > 1.0 / MAX_AREA_RATIO)) return VERDICT_NONE;
-    const double sigma_px = place_sigma_px(s, forward, at, to, area);
-    if (!(2.58 * sigma_px <= (double)params->t_transfer_px)) return VERDICT_NONE;
-
-    ground_patch_t patch;
-    ground_lookup_t found;
-    if (!oc_ground_patch_take(&s->from->grey, at[0], at[1], params->window_px, &patch)) return VERDICT_NONE;
-    oc_ground_look_up(&patch, at, &s->to->grey, s->H, &found);
-    if (!found.is_inside) return VERDICT_NONE;
-    if (found.ncc < params->t_refuted) {
-        const float lack = params->t_refuted - (found.ncc > 0.0f ? found.ncc : 0.0f);
-        *strength = (uint8_t)(128.0f + 127.0f * lack / (params->t_refuted + 1e-6f));
-        return VERDICT_REFUTED;
-    }
-    if (found.ncc < params->t_g_second) return VERDICT_NONE;
-
-    const double off_px[2] = {J[0] * (double)found.dx_px + J[1] * (double)found.dy_px,
-                              J[2] * (double)found.dx_px + J[3] * (double)found.dy_px};
-    if (!is_at_height_0(s, params, at, off_px, sigma_px)) return VERDICT_NONE;
-    if (!agrees_back(s, params, at, &found)) return VERDICT_NONE;
-    *strength = (uint8_t)(255.0f * (found.ncc < 1.0f ? found.ncc : 1.0f));
-    return VERDICT_GROUND;
-}
-
-static void vote(oc_ground_votes_t *votes, verdict_t verdict, uint8_t strength)
-{
-    if (verdict == VERDICT_GROUND) {
-        if (votes->n_ground < UINT8_MAX) votes->n_ground++;
-        if (strength > votes->best_ground) votes->best_ground = strength;
-    } else if (verdict == VERDICT_REFUTED) {
-        if (votes->n_refuted < UINT8_MAX) votes->n_refuted++;
-        if (strength > votes->best_refuted) votes->best_refuted = strength;
-    }
-}
-
-static void judge_all(const sight_t *s, const ground_pair_t *forward, const oc_ground_params_t *params,
-                      oc_ground_votes_t votes[], uint8_t is_ground[])
+/* Add what the other view says about each junction. is_ground: it says ground, and clearly. */
+static void judge_all(const sight_t *s, const oc_ground_params_t *params, oc_ground_votes_t votes[],
+                      uint8_t is_ground[])
 {
     for (uint32_t i = 0; i < s->from->n_junctions; i++) {
-        uint8_t strength = 0;
-        const verdict_t verdict = judge(s, forward, params, &s->from->junctions[i], &strength);
-        is_ground[i] = verdict == VERDICT_GROUND;
-        vote(&votes[i], verdict, strength);
+        const double at[2] = {(double)s->from->junctions[i].x_px, (double)s->from->junctions[i].y_px};
+        double l;
+        is_ground[i] = 0;
+        if (!oc_ground_judge(s, params, at, &l)) continue;
+        oc_ground_vote(&votes[i], l);
+        is_ground[i] = l >= (double)params->t_ground;
     }
 }
 
@@ -303,11 +212,24 @@ oc_status_t oc_ground_match_views(oc_ground_ws_t *ws, const oc_ground_params_t *
     reverse.right = pair.left;
     memcpy(reverse.H, pair.H_inv, sizeof reverse.H);
     memcpy(reverse.H_inv, pair.H, sizeof reverse.H_inv);
-    const sight_t there = {.from = view, .to = reference, .pair = &pair, .H = pair.H, .H_inv = pair.H_inv};
-    const sight_t back = {
-        .from = reference, .to = view, .pair = &reverse, .H = pair.H_inv, .H_inv = pair.H, .is_reverse = true};
-    judge_all(&there, &pair, params, votes, ws->view_ground);
-    judge_all(&back, &pair, params, ref_votes, ws->ref_ground);
+    const double noise_sd = hypot(oc_ground_noise_sd(&view->grey), oc_ground_noise_sd(&reference->grey));
+    const sight_t there = {.from = view,
+                           .to = reference,
+                           .pair = &pair,
+                           .forward = &pair,
+                           .H = pair.H,
+                           .H_inv = pair.H_inv,
+                           .noise_sd = noise_sd};
+    const sight_t back = {.from = reference,
+                          .to = view,
+                          .pair = &reverse,
+                          .forward = &pair,
+                          .H = pair.H_inv,
+                          .H_inv = pair.H,
+                          .is_reverse = true,
+                          .noise_sd = noise_sd};
+    judge_all(&there, params, votes, ws->view_ground);
+    judge_all(&back, params, ref_votes, ws->ref_ground);
     keep_ground_matches(ws, ws->view_ground, ws->ref_ground);
     *result = found;
     return OC_OK;

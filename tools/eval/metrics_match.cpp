@@ -34,19 +34,6 @@ std::optional<Eigen::Vector2d> transfer(const Truth &truth, std::size_t from, st
     return at->pixel;
 }
 
-bool has_partner(const Truth &truth, const std::vector<ViewJunctions> &all, std::size_t order, const FoundJunction &j)
-{
-    for (std::size_t k = 0; k < all.size(); k++) {
-        const bool is_stored = k < order || j.reference_view == all[k].view;
-        if (!is_stored || all[k].view == all[order].view) continue;
-        const auto at = transfer(truth, all[order].view, all[k].view, j.px);
-        if (!at) continue;
-        for (const FoundJunction &other : all[k].junctions)
-            if ((other.px - *at).norm() <= kTransferRadiusPx) return true;
-    }
-    return false;
-}
-
 ShareMetric ground_from_matches(const Truth &truth, const std::vector<FoundMatch> &matches)
 {
     ShareMetric m;
@@ -104,6 +91,19 @@ bool is_true_obstacle(const DepthMap &map, const Eigen::Vector2d &pixel)
     return false;
 }
 
+bool is_covisible(const Truth &truth, const std::vector<ViewJunctions> &all, std::size_t order, const FoundJunction &j)
+{
+    for (std::size_t k = 0; k < all.size(); k++) {
+        const bool is_stored = k < order || j.reference_view == all[k].view;
+        if (!is_stored || all[k].view == all[order].view) continue;
+        const auto at = transfer(truth, all[order].view, all[k].view, j.px);
+        if (!at) continue;
+        for (const FoundJunction &other : all[k].junctions)
+            if ((other.px - *at).norm() <= kTransferRadiusPx) return true;
+    }
+    return false;
+}
+
 ShareMetric judge_ground(const Truth &truth, const std::vector<ViewJunctions> &all, Notes &notes)
 {
     ShareMetric m;
@@ -123,7 +123,7 @@ ShareMetric judge_ground(const Truth &truth, const std::vector<ViewJunctions> &a
                 obstacle++;
                 lost += is_labelled;
             }
-            if (!is_true || !has_partner(truth, all, order, j)) continue;
+            if (!is_true || !is_covisible(truth, all, order, j)) continue;
             covisible++;
             found += is_labelled;
         }

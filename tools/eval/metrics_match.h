@@ -32,11 +32,14 @@ bool is_true_obstacle(const DepthMap &map, const Eigen::Vector2d &pixel);
 /* Obstacle matches. */
 std::optional<ShareMetric> evaluate_matches(const Truth &truth, const Run &run, Notes &notes);
 
+/* Does a junction of its reference view, or of a view before views[order], lie within 2 px of where j of
+ * views[order], being ground, is truly seen? */
+bool is_covisible(const Truth &truth, const std::vector<ViewJunctions> &views, std::size_t order,
+                  const FoundJunction &j);
+
 /* Of labelled junctions, views in the order they were stored: n are the junctions labelled ground, correct
- * those that are true ground, recall the share of true ground junctions,
- * co-visible with a stored reference view, that are labelled ground. A
- * junction is co-visible when a junction of its own reference view or of a view listed before its own lies
- * within 2 px of its true transfer. obstacle_as_ground is the share of the true obstacle junctions that are
+ * those that are true ground, recall the share of true ground junctions
+ * that are co-visible which are labelled ground. obstacle_as_ground is the share of the true obstacle junctions that are
  * labelled ground. */
 ShareMetric judge_ground(const Truth &truth, const std::vector<ViewJunctions> &views, Notes &notes);
 

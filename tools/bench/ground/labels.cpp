@@ -91,7 +91,7 @@ double height_m(const eval::Truth &truth, std::size_t view, const Eigen::Vector2
     return highest;
 }
 
-void list_errors(const eval::Truth &truth, const Labelled &labelled)
+void list_junctions(const eval::Truth &truth, const Labelled &labelled, bool is_all)
 {
     static const char *const names[] = {"unknown", "ground", "obstacle"};
     for (std::size_t v = 0; v < labelled.views.size(); v++) {
@@ -100,9 +100,11 @@ void list_errors(const eval::Truth &truth, const Labelled &labelled)
         for (std::size_t i = 0; i < view.junctions.size(); i++) {
             const eval::FoundJunction &j = view.junctions[i];
             const bool is_ground = eval::is_true_ground(*truth.depth[view.view], j.px);
-            if (is_ground == (j.label == eval::Label::kGround)) continue;
-            std::printf("    view %2zu (%6.1f, %6.1f) %-8s is %s, confidence %.2f, obstacle to %.3f m\n", view.view,
-                        j.px.x(), j.px.y(), names[static_cast<int>(j.label)], is_ground ? "ground" : "not ground",
+            const bool is_seen_twice = is_ground && eval::is_covisible(truth, labelled.views, v, j);
+            if (!is_all && is_ground == (j.label == eval::Label::kGround)) continue;
+            std::printf("    view %2zu (%9.4f, %9.4f) %-8s is %s, confidence %.2f, obstacle to %.3f m\n", view.view,
+                        j.px.x(), j.px.y(), names[static_cast<int>(j.label)],
+                        is_seen_twice ? "ground_seen_twice" : is_ground ? "ground" : "not_ground",
                         labelled.confidence[v][i], height_m(truth, view.view, j.px));
         }
     }
@@ -126,7 +128,7 @@ Json judge(const eval::Truth &truth, const Labelled &labelled)
             called_obstacle += is_ground && j.label == eval::Label::kObstacle;
             obstacle_open += is_obstacle && j.label == eval::Label::kUnknown;
             if (j.label == eval::Label::kGround) ground.add(is_ground, confidence);
-            if (j.label == eval::Label::kObstacle) obstacle.add(is_obstacle, confidence);
+            if (j.label == eval::Label::kObstacle) obstacle.add(!is_ground, confidence);
         }
     }
     const auto maybe = [](const std::optional<double> &x) { return x ? Json(*x) : Json(nullptr); };
@@ -179,7 +181,7 @@ Json measure_labels(const LabelOptions &options)
                     percent(row["obstacle_as_ground"]).c_str(), percent(row["ground_as_obstacle"]).c_str(),
                     percent(row["obstacle_open"]).c_str(), calibration_text(row["confidence_ground"]).c_str(),
                     calibration_text(row["confidence_obstacle"]).c_str(), row["ms_per_view"].get<double>());
-        if (options.lists_errors) list_errors(truth, labelled);
+        if (options.lists_errors || options.lists_all) list_junctions(truth, labelled, options.lists_all);
         rows.push_back(std::move(row));
     }
     return rows;

@@ -34,6 +34,7 @@ int main(int argc, char **argv)
     labels->add_option("--poses", options.modes, "exact, or as outcrop-drive --perturb: 1 2 3:drift");
     labels->add_option("--images", options.images, "pictures from this folder of the site");
     labels->add_flag("--errors", options.lists_errors, "one line per wrong label");
+    labels->add_flag("--all", options.lists_all, "one line per junction");
     labels->add_option("--json", json_file, "also write the figures here");
 
     try {
