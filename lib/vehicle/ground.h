@@ -84,15 +84,23 @@ typedef struct oc_ground_result {
     double rms_px;           /* transfer error of the inliers */
 } oc_ground_result_t;
 
-/* Scratch for oc_ground_match_views and its answers; about 40 kB. Placed by the caller. */
+/* Two pixels that show the same place if it is on the ground. */
+typedef struct oc_ground_pin {
+    float x_px, y_px, x2_px, y2_px; /* view, reference */
+    float variance_px2;             /* of the reference pixel, each axis */
+} oc_ground_pin_t;
+
+/* Scratch for oc_ground_match_views and its answers; about 60 kB. Placed by the caller. */
 typedef struct oc_ground_ws {
     oc_ground_match_t matches[OC_MAX_JUNCTIONS]; /* first pass, then the final pairs */
     uint32_t n_matches;
-    uint8_t is_inlier[OC_MAX_JUNCTIONS];
+    oc_ground_pin_t pins[OC_MAX_JUNCTIONS]; /* what the homography is fitted to */
+    uint32_t n_pins;
+    uint8_t is_inlier[OC_MAX_JUNCTIONS]; /* of pins */
     uint16_t best_right[OC_MAX_JUNCTIONS], best_left[OC_MAX_JUNCTIONS];
     float ncc_right[OC_MAX_JUNCTIONS], ncc_left[OC_MAX_JUNCTIONS];
     uint8_t view_ground[OC_MAX_JUNCTIONS], ref_ground[OC_MAX_JUNCTIONS];
-    float design[OC_MAX_JUNCTIONS * 4]; /* positions of the matches, scaled */
+    float design[OC_MAX_JUNCTIONS * 4]; /* positions of the pins, scaled */
 } oc_ground_ws_t;
 
 oc_ground_params_t oc_ground_defaults(void);

@@ -12,7 +12,7 @@
 #define GROUND_SEARCH_PX 3
 #define GROUND_MAX_WIDE_PX (OC_MAX_GROUND_WINDOW_PX + 2u * GROUND_SEARCH_PX)
 
-/* ---- the pair's geometry (ground_homography.c) ---- */
+/* ---- the pair's geometry (ground_ransac.c, ground_homography.c) ---- */
 
 /* Two cameras moved inside their margins so that the ground matches agree. */
 typedef struct ground_pair {
@@ -23,14 +23,19 @@ typedef struct ground_pair {
     double cov[GROUND_PARAMS][GROUND_PARAMS]; /* of u after the fit */
 } ground_pair_t;
 
-/* Find the largest set of matches that one homography explains and refine the
- * pair with it: marks ws->is_inlier, fills result and pair. Leaves
- * result->is_refined false when there is no such set or the poses would have
- * to leave their margins for it. */
-void oc_ground_refine(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
-                      const oc_ground_view_t *reference, ground_pair_t *pair, oc_ground_result_t *result);
+/* What an error is worth to a homography's score; share = r^2 / r_max^2. 1 at 0, 0 from 1 on. */
+double oc_ground_gain(double share);
 
-/* Fit the pair again, to the matches that ws has now. False, and pair and
+/* Find the homography that most pins share and mark ws->is_inlier. Returns their number. */
+uint32_t oc_ground_ransac(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
+                          const oc_ground_view_t *reference);
+
+/* RANSAC over ws->pins, and the pair moved inside the margins to fit. False when
+ * no homography has enough pins, or the poses would have to leave their margins for it. */
+bool oc_ground_fit(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
+                   const oc_ground_view_t *reference, ground_pair_t *pair, oc_ground_result_t *result);
+
+/* Fit the pair again, to the pins that ws has now. False, and pair and
  * result as they were, when too few of them agree. */
 bool oc_ground_refit(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
                      const oc_ground_view_t *reference, ground_pair_t *pair, oc_ground_result_t *result);
@@ -95,9 +100,14 @@ typedef struct sight {
     double noise_sd;              /* of both images together */
 } sight_t;
 
-/* What this look says of the point at a pixel of `from`: the log-likelihood
- * ratio of ground against the rest, natural logarithm. False when nothing can
- * be said: outside, too oblique, place not known. */
-bool oc_ground_judge(const sight_t *s, const oc_ground_params_t *params, const double at[2], double *l);
+/* What one look says. */
+typedef struct ground_look {
+    double l;           /* log-likelihood ratio of ground against the rest, natural logarithm */
+    oc_ground_pin_t pin; /* the middle of the window and where it was found; from -> to */
+} ground_look_t;
+
+/* Look for what is at a pixel of `from` where the ground would be in `to`. False
+ * when nothing can be said: outside, too oblique, place not known. */
+bool oc_ground_judge(const sight_t *s, const oc_ground_params_t *params, const double at[2], ground_look_t *look);
 
 #endif

@@ -24,8 +24,10 @@
  * resampling, and windows that are not quite flat. */
 #define SHIFT_FLOOR_PX 0.1
 
-/* Unevenness of a floor, as a share of t_h; one standard deviation. */
+/* Unevenness of a floor, one standard deviation: this share of t_h, and at
+ * most this share of the cameras' height. Who looks from nearby means it. */
 #define UNEVEN_SHARE 0.15
+#define UNEVEN_SLOPE 0.0015
 
 /* Half of what stands on the ground is higher than this many t_h. */
 #define TYPICAL_HEIGHT 10.0
@@ -113,6 +115,17 @@ static bool place_covariance(const sight_t *s, const double at[2], const double 
     return true;
 }
 
+/* Unevenness in t_h. */
+static double uneven_share(const sight_t *s, double t_h_m)
+{
+    double a[3], b[3];
+    oc_pose_centre(&s->from->camera.pose, a);
+    oc_pose_centre(&s->to->camera.pose, b);
+    const double lower_m = fabs(a[2]) < fabs(b[2]) ? fabs(a[2]) : fabs(b[2]);
+    const double slope = UNEVEN_SLOPE * lower_m / t_h_m;
+    return slope < UNEVEN_SHARE ? slope : UNEVEN_SHARE;
+}
+
 /* Squared Mahalanobis length of v. */
 static double cov_distance2(const double cov[3], const double v[2])
 {
@@ -156,13 +169,13 @@ static double unresolved_share(double sigma_along_px, double rise_px)
 /* off_px from the place of the ground to where the window was found, with its
  * covariance; rise_px the way it goes for a height of t_h. */
 static double weigh(const ground_lookup_t *found, const double off_px[2], const double cov_px2[3],
-                    const double rise_px[2])
+                    const double rise_px[2], double uneven_share)
 {
     const double seen = appearance((double)found->ncc, (double)found->worst_block);
     if (found->is_at_border) return seen < L_LOST ? seen : L_LOST;
     if (seen <= 0.0) return seen;
 
-    const double uneven[2] = {UNEVEN_SHARE * rise_px[0], UNEVEN_SHARE * rise_px[1]};
+    const double uneven[2] = {uneven_share * rise_px[0], uneven_share * rise_px[1]};
     const double cov[3] = {cov_px2[0] + uneven[0] * uneven[0], cov_px2[1] + uneven[0] * uneven[1],
                            cov_px2[2] + uneven[1] * uneven[1]};
     const double l = seen - 0.5 * cov_distance2(cov, off_px);
@@ -179,7 +192,22 @@ static double weigh(const ground_lookup_t *found, const double off_px[2], const 
     return -log(blind + (1.0 - blind) * exp(-l));
 }
 
-bool oc_ground_judge(const sight_t *s, const oc_ground_params_t *params, const double at[2], double *l)
+/* The middle of the window and where it was found. Uneven ground counts as noise on both axes. */
+static bool pin_make(const sight_t *s, const double mid[2], const double shift[2], const double seen_cov[3],
+                     const double rise_px[2], double uneven_share, oc_ground_pin_t *pin)
+{
+    double x, y;
+    if (oc_homography_apply(s->H, mid[0] + shift[0], mid[1] + shift[1], &x, &y) == 0.0) return false;
+    const double uneven2 = uneven_share * uneven_share * (rise_px[0] * rise_px[0] + rise_px[1] * rise_px[1]);
+    *pin = (oc_ground_pin_t){.x_px = (float)mid[0],
+                             .y_px = (float)mid[1],
+                             .x2_px = (float)x,
+                             .y2_px = (float)y,
+                             .variance_px2 = (float)(0.5 * (seen_cov[0] + seen_cov[2] + uneven2))};
+    return true;
+}
+
+bool oc_ground_judge(const sight_t *s, const oc_ground_params_t *params, const double at[2], ground_look_t *look)
 {
     double to[2], mid[2], J[4], cov[3], rise_px[2];
     if (!(oc_homography_apply(s->H, at[0], at[1], &to[0], &to[1]) > 0.0)) return false;
@@ -202,9 +230,10 @@ bool oc_ground_judge(const sight_t *s, const oc_ground_params_t *params, const d
     const double shift_cov[3] = {(double)found.cov_px2[0], (double)found.cov_px2[1], (double)found.cov_px2[2]};
     double seen_cov[3];
     cov_carry(J, shift_cov, seen_cov);
+    seen_cov[0] += SHIFT_FLOOR_PX * SHIFT_FLOOR_PX;
+    seen_cov[2] += SHIFT_FLOOR_PX * SHIFT_FLOOR_PX;
     for (int k = 0; k < 3; k++) cov[k] += seen_cov[k];
-    cov[0] += SHIFT_FLOOR_PX * SHIFT_FLOOR_PX;
-    cov[2] += SHIFT_FLOOR_PX * SHIFT_FLOOR_PX;
-    *l = weigh(&found, off_px, cov, rise_px);
-    return true;
+    const double share = uneven_share(s, params->t_h_m);
+    look->l = weigh(&found, off_px, cov, rise_px, share);
+    return pin_make(s, mid, shift, seen_cov, rise_px, share, &look->pin);
 }

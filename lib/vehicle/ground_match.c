@@ -11,6 +11,9 @@
 /* Pairs correlated in one pass; keeps the time of absurdly wide margins bounded. */
 #define MAX_CANDIDATES 60000u
 
+/* Times that the pair is fitted to what was found; the second reaches what the first brought into reach. */
+#define REGISTER_ROUNDS 2
+
 #define NO_MATCH UINT16_MAX
 
 /* ---- pairing junctions ---- */
@@ -118,11 +121,47 @@ static void judge_all(const sight_t *s, const oc_ground_params_t *params, oc_gro
 {
     for (uint32_t i = 0; i < s->from->n_junctions; i++) {
         const double at[2] = {(double)s->from->junctions[i].x_px, (double)s->from->junctions[i].y_px};
-        double l;
+        ground_look_t look;
         is_ground[i] = 0;
-        if (!oc_ground_judge(s, params, at, &l)) continue;
-        oc_ground_vote(&votes[i], l);
-        is_ground[i] = l >= (double)params->t_ground;
+        if (!oc_ground_judge(s, params, at, &look)) continue;
+        oc_ground_vote(&votes[i], look.l);
+        is_ground[i] = look.l >= (double)params->t_ground;
+    }
+}
+
+/* ---- pins ---- */
+
+/* The matches as pins: two junctions, each sigma_px off. */
+static void pins_from_matches(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
+                              const oc_ground_view_t *reference, const double H[9])
+{
+    ws->n_pins = 0;
+    for (uint32_t i = 0; i < ws->n_matches; i++) {
+        const oc_junction_t *a = &view->junctions[ws->matches[i].left];
+        const oc_junction_t *b = &reference->junctions[ws->matches[i].right];
+        double J[4] = {1.0, 0.0, 0.0, 1.0};
+        /* The left junction's error arrives magnified; its area stands for both axes. Where the Jacobian does not
+         * exist the pin is no inlier either. */
+        const oc_status_t status = oc_homography_jacobian(H, (double)a->x_px, (double)a->y_px, J);
+        const double area = status == OC_OK ? fabs(J[0] * J[3] - J[1] * J[2]) : 1.0;
+        ws->pins[ws->n_pins++] =
+            (oc_ground_pin_t){.x_px = a->x_px,
+                              .y_px = a->y_px,
+                              .x2_px = b->x_px,
+                              .y2_px = b->y_px,
+                              .variance_px2 = (float)(params->sigma_px * params->sigma_px * (1.0 + area))};
+    }
+}
+
+/* What was found on the ground as pins: pictures laid over each other, ten times better known than junctions. */
+static void pins_from_looks(oc_ground_ws_t *ws, const oc_ground_params_t *params, const sight_t *s)
+{
+    ws->n_pins = 0;
+    for (uint32_t i = 0; i < s->from->n_junctions; i++) {
+        const double at[2] = {(double)s->from->junctions[i].x_px, (double)s->from->junctions[i].y_px};
+        ground_look_t look;
+        if (!oc_ground_judge(s, params, at, &look) || !(look.l >= (double)params->t_ground)) continue;
+        ws->pins[ws->n_pins++] = look.pin;
     }
 }
 
@@ -142,7 +181,7 @@ static oc_status_t check_view(const oc_ground_view_t *v)
 
 /* First pass: junction pairs inside the windows that the margins allow. */
 static oc_status_t first_pass(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
-                              const oc_ground_view_t *reference, oc_ground_result_t *result)
+                              const oc_ground_view_t *reference, double H[9], oc_ground_result_t *result)
 {
     oc_pair_t prepared;
     const oc_status_t status = oc_pair_prepare(&prepared, &view->camera, &view->margin, &reference->camera,
@@ -159,6 +198,7 @@ static oc_status_t first_pass(oc_ground_ws_t *ws, const oc_ground_params_t *para
                            .t_ncc = params->t_g};
     result->n_candidates = pair_up(ws, params, &how);
     result->n_matches = ws->n_matches;
+    memcpy(H, prepared.H, sizeof prepared.H);
     return OC_OK;
 }
 
@@ -168,7 +208,7 @@ static void keep_ground_matches(oc_ground_ws_t *ws, const uint8_t view_ground[],
     uint32_t n = 0;
     for (uint32_t i = 0; i < ws->n_matches; i++) {
         const oc_ground_match_t m = ws->matches[i];
-        if (!ws->is_inlier[i] || !view_ground[m.left] || !ref_ground[m.right]) continue;
+        if (!view_ground[m.left] || !ref_ground[m.right]) continue;
         ws->matches[n++] = m;
     }
     ws->n_matches = n;
@@ -187,10 +227,12 @@ oc_status_t oc_ground_match_views(oc_ground_ws_t *ws, const oc_ground_params_t *
 
     oc_ground_result_t found = {.is_refined = false};
     ws->n_matches = 0;
-    status = first_pass(ws, params, view, reference, &found);
+    double prior_H[9];
+    status = first_pass(ws, params, view, reference, prior_H, &found);
     if (status != OC_OK) return status;
     ground_pair_t pair;
-    oc_ground_refine(ws, params, view, reference, &pair, &found);
+    pins_from_matches(ws, params, view, reference, prior_H);
+    found.is_refined = oc_ground_fit(ws, params, view, reference, &pair, &found);
     if (!found.is_refined) {
         ws->n_matches = 0;
         *result = found;
@@ -205,13 +247,9 @@ oc_status_t oc_ground_match_views(oc_ground_ws_t *ws, const oc_ground_params_t *
                               .radius_px = (double)params->t_transfer_px,
                               .t_ncc = params->t_g_second};
     (void)pair_up(ws, params, &narrow);
-    if (!oc_ground_refit(ws, params, view, reference, &pair, &found)) ws->n_matches = 0;
+    pins_from_matches(ws, params, view, reference, pair.H);
+    (void)oc_ground_refit(ws, params, view, reference, &pair, &found);
 
-    ground_pair_t reverse = pair;
-    reverse.left = pair.right;
-    reverse.right = pair.left;
-    memcpy(reverse.H, pair.H_inv, sizeof reverse.H);
-    memcpy(reverse.H_inv, pair.H, sizeof reverse.H_inv);
     const double noise_sd = hypot(oc_ground_noise_sd(&view->grey), oc_ground_noise_sd(&reference->grey));
     const sight_t there = {.from = view,
                            .to = reference,
@@ -220,6 +258,15 @@ oc_status_t oc_ground_match_views(oc_ground_ws_t *ws, const oc_ground_params_t *
                            .H = pair.H,
                            .H_inv = pair.H_inv,
                            .noise_sd = noise_sd};
+    for (int round = 0; round < REGISTER_ROUNDS; round++) {
+        pins_from_looks(ws, params, &there);
+        if (!oc_ground_refit(ws, params, view, reference, &pair, &found)) break;
+    }
+    ground_pair_t reverse = pair;
+    reverse.left = pair.right;
+    reverse.right = pair.left;
+    memcpy(reverse.H, pair.H_inv, sizeof reverse.H);
+    memcpy(reverse.H_inv, pair.H, sizeof reverse.H_inv);
     const sight_t back = {.from = reference,
                           .to = view,
                           .pair = &reverse,
