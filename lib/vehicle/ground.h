@@ -90,12 +90,21 @@ typedef struct oc_ground_pin {
     float variance_px2;             /* of the reference pixel, each axis */
 } oc_ground_pin_t;
 
-/* Scratch for oc_ground_match_views and its answers; about 60 kB. Placed by the caller. */
+/* What was seen where the ground would be. */
+typedef struct oc_ground_look {
+    bool is_done, is_lost; /* looked at; nothing found there */
+    float ncc, worst_block;
+    float mid_px[2], found_px[2]; /* middle of the window, and where it was found in the other view */
+    float cov_px2[3];             /* of that, from the pictures alone: xx, xy, yy */
+} oc_ground_look_t;
+
+/* Scratch for oc_ground_match_views and its answers; about 100 kB. Placed by the caller. */
 typedef struct oc_ground_ws {
     oc_ground_match_t matches[OC_MAX_JUNCTIONS]; /* first pass, then the final pairs */
     uint32_t n_matches;
     oc_ground_pin_t pins[OC_MAX_JUNCTIONS]; /* what the homography is fitted to */
     uint32_t n_pins;
+    oc_ground_look_t looks[OC_MAX_JUNCTIONS]; /* from the view's junctions to the reference */
     uint8_t is_inlier[OC_MAX_JUNCTIONS]; /* of pins */
     uint16_t best_right[OC_MAX_JUNCTIONS], best_left[OC_MAX_JUNCTIONS];
     float ncc_right[OC_MAX_JUNCTIONS], ncc_left[OC_MAX_JUNCTIONS];

@@ -9,6 +9,9 @@
 /* Below this, on every third sample, the whole window is not looked at. */
 #define QUICK_NCC 0.3f
 
+/* A peak of this height in the middle of the search is not doubted. */
+#define CLEAR_NCC 0.8f
+
 /* Grey levels; a flatter window correlates with anything. */
 #define MIN_SD 1.5f
 
@@ -21,7 +24,13 @@
 /* Four floats side by side. Sums are kept lane by lane and added up in one fixed
  * order, so that every machine gets the same bits. */
 typedef float lanes_t __attribute__((vector_size(16)));
+typedef int32_t int_lanes_t __attribute__((vector_size(16)));
 #define N_LANES 4u
+
+static lanes_t lanes_of(float x)
+{
+    return (lanes_t){x, x, x, x};
+}
 
 static lanes_t lanes_load(const float *p)
 {
@@ -37,36 +46,69 @@ static float lanes_sum(lanes_t v)
 
 /* ---- reading windows ---- */
 
-/* Read the window whose sample (c, r) is at H (x + (c - half) step, ...) + shift. */
-static bool warp_window(const oc_image_t *grey, const double H[9], const double at[2], const double shift[2],
-                        int32_t half, int32_t step, float *out, uint32_t out_stride)
+/* A square of samples: H (at + (c, r) step) + shift for c, r in -half .. half. */
+typedef struct window_read {
+    const double *H, *at, *shift;
+    int32_t half, step;
+} window_read_t;
+
+/* Are all samples inside the image, with a neighbour to the right and below? In
+ * front of both cameras a square becomes a convex figure, so its corners tell. */
+static bool window_is_inside(const oc_image_t *grey, const window_read_t *w)
 {
-    const float max_x = (float)(grey->width_px - 1u);
-    const float max_y = (float)(grey->height_px - 1u);
-    const size_t stride = grey->stride_bytes;
-    const float shift_x = (float)shift[0], shift_y = (float)shift[1];
-    const float gx = (float)H[0], gy = (float)H[3], gw = (float)H[6];
-    for (int32_t r = -half; r <= half; r += step) {
-        const double y = at[1] + r;
-        const float bx = (float)(H[0] * at[0] + H[1] * y + H[2]);
-        const float by = (float)(H[3] * at[0] + H[4] * y + H[5]);
-        const float bw = (float)(H[6] * at[0] + H[7] * y + H[8]);
-        float *o = out;
-        for (int32_t c = -half; c <= half; c += step) {
-            const float f = (float)c;
-            const float w = bw + gw * f;
-            const float u = (bx + gx * f) / w + shift_x;
-            const float v = (by + gy * f) / w + shift_y;
-            if (!(u >= 0.0f && v >= 0.0f && u < max_x && v < max_y)) return false;
-            const uint32_t ix = (uint32_t)u, iy = (uint32_t)v;
-            const float ax = u - (float)ix, ay = v - (float)iy;
-            const uint8_t *p = grey->px + (size_t)iy * stride + ix;
-            const uint8_t *q = p + stride;
-            const float top = (float)p[0] + ax * (float)(p[1] - p[0]);
-            const float bottom = (float)q[0] + ax * (float)(q[1] - q[0]);
-            *o++ = top + ay * (bottom - top);
+    const double max_x = grey->width_px - 1.01, max_y = grey->height_px - 1.01;
+    for (int k = 0; k < 4; k++) {
+        double x, y;
+        const double cx = w->at[0] + (k % 2 ? w->half : -w->half), cy = w->at[1] + (k / 2 ? w->half : -w->half);
+        if (!(oc_homography_apply(w->H, cx, cy, &x, &y) > 0.0)) return false;
+        x += w->shift[0];
+        y += w->shift[1];
+        if (!(x >= 0.01 && y >= 0.01 && x <= max_x && y <= max_y)) return false;
+    }
+    return true;
+}
+
+/* Four neighbouring bytes of each lane's sample, and between them. */
+static lanes_t lanes_sample(const oc_image_t *grey, lanes_t u, lanes_t v)
+{
+    const int_lanes_t ix = __builtin_convertvector(u, int_lanes_t), iy = __builtin_convertvector(v, int_lanes_t);
+    const lanes_t ax = u - __builtin_convertvector(ix, lanes_t), ay = v - __builtin_convertvector(iy, lanes_t);
+    int_lanes_t p0, p1, q0, q1;
+    for (uint32_t k = 0; k < N_LANES; k++) {
+        const uint8_t *p = grey->px + (size_t)(uint32_t)iy[k] * grey->stride_bytes + (uint32_t)ix[k];
+        p0[k] = p[0];
+        p1[k] = p[1];
+        q0[k] = p[grey->stride_bytes];
+        q1[k] = p[grey->stride_bytes + 1u];
+    }
+    const lanes_t left = __builtin_convertvector(p0, lanes_t), below = __builtin_convertvector(q0, lanes_t);
+    const lanes_t top = left + ax * __builtin_convertvector(p1 - p0, lanes_t);
+    const lanes_t bottom = below + ax * __builtin_convertvector(q1 - q0, lanes_t);
+    return top + ay * (bottom - top);
+}
+
+/* Read a window; rows are out_stride apart, a multiple of the lanes. False when it sticks out of the image. */
+static bool window_warp(const oc_image_t *grey, const window_read_t *w, float *out, uint32_t out_stride)
+{
+    if (!window_is_inside(grey, w)) return false;
+    const uint32_t n = 2u * (uint32_t)(w->half / w->step) + 1u;
+    float column[GROUND_WIDE_STRIDE]; /* behind the last: the last again, so that lanes never leave the window */
+    for (uint32_t c = 0; c < GROUND_WIDE_STRIDE; c++) {
+        column[c] = (float)(-w->half + (int32_t)(c < n ? c : n - 1u) * w->step);
+    }
+    const double *H = w->H, *at = w->at;
+    const lanes_t shift_x = lanes_of((float)w->shift[0]), shift_y = lanes_of((float)w->shift[1]);
+    const lanes_t gx = lanes_of((float)H[0]), gy = lanes_of((float)H[3]), gw = lanes_of((float)H[6]);
+    for (uint32_t r = 0; r < n; r++) {
+        const double y = at[1] + (-w->half + (int32_t)r * w->step);
+        const lanes_t bx = lanes_of((float)(H[0] * at[0] + H[1] * y + H[2]));
+        const lanes_t by = lanes_of((float)(H[3] * at[0] + H[4] * y + H[5]));
+        const lanes_t bw = lanes_of((float)(H[6] * at[0] + H[7] * y + H[8]));
+        for (uint32_t c = 0; c < n; c += N_LANES) {
+            const lanes_t f = lanes_load(column + c), depth = bw + gw * f;
+            const lanes_t v = lanes_sample(grey, (bx + gx * f) / depth + shift_x, (by + gy * f) / depth + shift_y);
+            memcpy(out + r * out_stride + c, &v, sizeof v);
         }
-        out += out_stride;
     }
     return true;
 }
@@ -103,7 +145,8 @@ bool oc_ground_patch_take(const oc_image_t *grey, double x_px, double y_px, uint
     static const double still[2] = {0, 0};
     const double at[2] = {x_px, y_px};
     patch->n = n;
-    if (!warp_window(grey, same, at, still, (int32_t)(n / 2u), 1, patch->v, GROUND_PATCH_STRIDE)) return false;
+    const window_read_t read = {.H = same, .at = at, .shift = still, .half = (int32_t)(n / 2u), .step = 1};
+    if (!window_warp(grey, &read, patch->v, GROUND_PATCH_STRIDE)) return false;
     patch->sd = window_normalise(patch->v, n);
     return patch->sd >= MIN_SD;
 }
@@ -155,10 +198,12 @@ float oc_ground_correlate(const ground_patch_t *patch, const double at[2], const
     const int32_t half = (int32_t)(patch->n / 2u);
     const int32_t sparse_half = half - half % 3;
     float window[OC_MAX_GROUND_WINDOW_PX * GROUND_PATCH_STRIDE];
-    if (!warp_window(grey, H, at, shift, sparse_half, 3, window, GROUND_PATCH_STRIDE)) return -1.0f;
+    const window_read_t sparse = {.H = H, .at = at, .shift = shift, .half = sparse_half, .step = 3};
+    const window_read_t dense = {.H = H, .at = at, .shift = shift, .half = half, .step = 1};
+    if (!window_warp(grey, &sparse, window, GROUND_PATCH_STRIDE)) return -1.0f;
     if (correlate_quick(patch, window, (uint32_t)(half - sparse_half)) < QUICK_NCC) return -1.0f;
 
-    if (!warp_window(grey, H, at, shift, half, 1, window, GROUND_PATCH_STRIDE)) return -1.0f;
+    if (!window_warp(grey, &dense, window, GROUND_PATCH_STRIDE)) return -1.0f;
     if (window_normalise(window, patch->n) < MIN_SD) return -1.0f;
     return window_product(patch, window, GROUND_PATCH_STRIDE);
 }
@@ -217,29 +262,55 @@ static void wide_centre(float *wide, uint32_t wide_n)
     }
 }
 
-/* Best correlation over whole pixels, and the parabolas' vertex round it. */
-static bool peak_find(const ground_patch_t *patch, const float *wide, ground_lookup_t *found)
+/* Correlations at whole pixels, and the best of them. */
+typedef struct peak {
+    float ncc[SIDE][SIDE];
+    float variance[SIDE][SIDE]; /* times n^2 */
+    uint32_t c, r;
+} peak_t;
+
+/* Correlate within `reach` of the middle. */
+static void peak_search(const ground_patch_t *patch, const float *wide, uint32_t reach, peak_t *peak)
 {
-    float ncc[SIDE][SIDE], variance[SIDE][SIDE];
-    window_variances(wide, patch->n, variance);
     const float least = MIN_SD * MIN_SD * (float)(patch->n * patch->n);
-    uint32_t best_c = GROUND_SEARCH_PX, best_r = GROUND_SEARCH_PX;
-    for (uint32_t r = 0; r < SIDE; r++) {
-        for (uint32_t c = 0; c < SIDE; c++) {
+    peak->c = peak->r = GROUND_SEARCH_PX;
+    for (uint32_t r = GROUND_SEARCH_PX - reach; r <= GROUND_SEARCH_PX + reach; r++) {
+        for (uint32_t c = GROUND_SEARCH_PX - reach; c <= GROUND_SEARCH_PX + reach; c++) {
             const float product = window_product(patch, wide + r * GROUND_WIDE_STRIDE + c, GROUND_WIDE_STRIDE);
-            ncc[r][c] = variance[r][c] > least ? product / sqrtf(variance[r][c]) : -1.0f;
-            if (ncc[r][c] > ncc[best_r][best_c]) {
-                best_c = c;
-                best_r = r;
-            }
+            const float variance = peak->variance[r][c];
+            peak->ncc[r][c] = variance > least ? product / sqrtf(variance) : -1.0f;
         }
     }
-    found->ncc = ncc[best_r][best_c];
-    found->shift_px[0] = (float)best_c - GROUND_SEARCH_PX;
-    found->shift_px[1] = (float)best_r - GROUND_SEARCH_PX;
-    if (best_c == 0 || best_c + 1 == SIDE || best_r == 0 || best_r + 1 == SIDE) return false;
-    found->shift_px[0] += vertex(ncc[best_r][best_c - 1], found->ncc, ncc[best_r][best_c + 1]);
-    found->shift_px[1] += vertex(ncc[best_r - 1][best_c], found->ncc, ncc[best_r + 1][best_c]);
+    for (uint32_t r = GROUND_SEARCH_PX - reach; r <= GROUND_SEARCH_PX + reach; r++) {
+        for (uint32_t c = GROUND_SEARCH_PX - reach; c <= GROUND_SEARCH_PX + reach; c++) {
+            if (!(peak->ncc[r][c] > peak->ncc[peak->r][peak->c])) continue;
+            peak->c = c;
+            peak->r = r;
+        }
+    }
+}
+
+/* Best correlation over whole pixels, and the parabolas' vertex round it. False
+ * when the best is at the end of the search. */
+static bool peak_find(const ground_patch_t *patch, const float *wide, ground_lookup_t *found)
+{
+    peak_t peak;
+    window_variances(wide, patch->n, peak.variance);
+    /* Most of the ground is where it should be, and seen at once. */
+    peak_search(patch, wide, 1, &peak);
+    uint32_t reach = 1;
+    if (peak.c != GROUND_SEARCH_PX || peak.r != GROUND_SEARCH_PX || peak.ncc[peak.r][peak.c] < CLEAR_NCC) {
+        reach = GROUND_SEARCH_PX;
+        peak_search(patch, wide, reach, &peak);
+    }
+    const float best = peak.ncc[peak.r][peak.c];
+    found->ncc = best;
+    found->shift_px[0] = (float)peak.c - GROUND_SEARCH_PX;
+    found->shift_px[1] = (float)peak.r - GROUND_SEARCH_PX;
+    if (peak.c == GROUND_SEARCH_PX - reach || peak.c == GROUND_SEARCH_PX + reach) return false;
+    if (peak.r == GROUND_SEARCH_PX - reach || peak.r == GROUND_SEARCH_PX + reach) return false;
+    found->shift_px[0] += vertex(peak.ncc[peak.r][peak.c - 1], best, peak.ncc[peak.r][peak.c + 1]);
+    found->shift_px[1] += vertex(peak.ncc[peak.r - 1][peak.c], best, peak.ncc[peak.r + 1][peak.c]);
     return true;
 }
 
@@ -314,7 +385,9 @@ static void shift_refine(const ground_patch_t *patch, const double at[2], const 
     float step[2] = {0.0f, 0.0f};
     for (int round = 0; round < 2; round++) {
         const double there[2] = {at[0] + (double)found->shift_px[0], at[1] + (double)found->shift_px[1]};
-        if (!warp_window(grey, H, there, still, (int32_t)(patch->n / 2u), 1, window, GROUND_PATCH_STRIDE)) return;
+        const window_read_t read = {
+            .H = H, .at = there, .shift = still, .half = (int32_t)(patch->n / 2u), .step = 1};
+        if (!window_warp(grey, &read, window, GROUND_PATCH_STRIDE)) return;
         if (window_normalise(window, patch->n) < MIN_SD) return;
         const float ncc = window_product(patch, window, GROUND_PATCH_STRIDE);
         if (round > 0 && ncc < found->ncc) { /* a step too far */
@@ -339,7 +412,8 @@ void oc_ground_look_up(const ground_patch_t *patch, const double at[2], const oc
 
     float wide[GROUND_MAX_WIDE_PX * GROUND_WIDE_STRIDE];
     const uint32_t wide_n = patch->n + 2u * GROUND_SEARCH_PX;
-    if (!warp_window(grey, H, at, still, (int32_t)(wide_n / 2u), 1, wide, GROUND_WIDE_STRIDE)) return;
+    const window_read_t read = {.H = H, .at = at, .shift = still, .half = (int32_t)(wide_n / 2u), .step = 1};
+    if (!window_warp(grey, &read, wide, GROUND_WIDE_STRIDE)) return;
     found->is_inside = true;
     wide_centre(wide, wide_n);
     found->is_at_border = !peak_find(patch, wide, found);

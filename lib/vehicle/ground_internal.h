@@ -100,14 +100,13 @@ typedef struct sight {
     double noise_sd;              /* of both images together */
 } sight_t;
 
-/* What one look says. */
-typedef struct ground_look {
-    double l;           /* log-likelihood ratio of ground against the rest, natural logarithm */
-    oc_ground_pin_t pin; /* the middle of the window and where it was found; from -> to */
-} ground_look_t;
+/* Look for what is at a pixel of `from` where the ground would be in `to`. False,
+ * and look->is_done false, when that cannot be done: outside, too oblique, place not known. */
+bool oc_ground_look(const sight_t *s, const oc_ground_params_t *params, const double at[2], oc_ground_look_t *look);
 
-/* Look for what is at a pixel of `from` where the ground would be in `to`. False
- * when nothing can be said: outside, too oblique, place not known. */
-bool oc_ground_judge(const sight_t *s, const oc_ground_params_t *params, const double at[2], ground_look_t *look);
+/* What a look says, with the pair as it now stands: l, the log-likelihood ratio
+ * of ground against the rest, natural logarithm; and where the window was found. False when it says nothing. */
+bool oc_ground_weigh(const sight_t *s, const oc_ground_params_t *params, const double at[2],
+                     const oc_ground_look_t *look, double *l, oc_ground_pin_t *pin);
 
 #endif

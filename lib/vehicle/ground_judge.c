@@ -168,11 +168,11 @@ static double unresolved_share(double sigma_along_px, double rise_px)
 
 /* off_px from the place of the ground to where the window was found, with its
  * covariance; rise_px the way it goes for a height of t_h. */
-static double weigh(const ground_lookup_t *found, const double off_px[2], const double cov_px2[3],
+static double weigh(const oc_ground_look_t *look, const double off_px[2], const double cov_px2[3],
                     const double rise_px[2], double uneven_share)
 {
-    const double seen = appearance((double)found->ncc, (double)found->worst_block);
-    if (found->is_at_border) return seen < L_LOST ? seen : L_LOST;
+    const double seen = appearance((double)look->ncc, (double)look->worst_block);
+    if (look->is_lost) return seen < L_LOST ? seen : L_LOST;
     if (seen <= 0.0) return seen;
 
     const double uneven[2] = {uneven_share * rise_px[0], uneven_share * rise_px[1]};
@@ -192,48 +192,78 @@ static double weigh(const ground_lookup_t *found, const double off_px[2], const 
     return -log(blind + (1.0 - blind) * exp(-l));
 }
 
-/* The middle of the window and where it was found. Uneven ground counts as noise on both axes. */
-static bool pin_make(const sight_t *s, const double mid[2], const double shift[2], const double seen_cov[3],
-                     const double rise_px[2], double uneven_share, oc_ground_pin_t *pin)
+/* ---- the two halves of a judgement ---- */
+
+/* Geometry of a look at one point with the pair as it stands. */
+typedef struct place {
+    double to[2], J[4]; /* where the ground would be, and the transfer's Jacobian there */
+    double cov[3];      /* of that place */
+} place_t;
+
+static bool place_find(const sight_t *s, const double at[2], place_t *place)
 {
-    double x, y;
-    if (oc_homography_apply(s->H, mid[0] + shift[0], mid[1] + shift[1], &x, &y) == 0.0) return false;
-    const double uneven2 = uneven_share * uneven_share * (rise_px[0] * rise_px[0] + rise_px[1] * rise_px[1]);
-    *pin = (oc_ground_pin_t){.x_px = (float)mid[0],
-                             .y_px = (float)mid[1],
-                             .x2_px = (float)x,
-                             .y2_px = (float)y,
-                             .variance_px2 = (float)(0.5 * (seen_cov[0] + seen_cov[2] + uneven2))};
-    return true;
+    if (!(oc_homography_apply(s->H, at[0], at[1], &place->to[0], &place->to[1]) > 0.0)) return false;
+    if (oc_homography_jacobian(s->H, at[0], at[1], place->J) != OC_OK) return false;
+    const double area = place->J[0] * place->J[3] - place->J[1] * place->J[2];
+    if (!(area < MAX_AREA_RATIO && area > 1.0 / MAX_AREA_RATIO)) return false;
+    return place_covariance(s, at, place->to, place->J, place->cov);
 }
 
-bool oc_ground_judge(const sight_t *s, const oc_ground_params_t *params, const double at[2], ground_look_t *look)
+bool oc_ground_look(const sight_t *s, const oc_ground_params_t *params, const double at[2], oc_ground_look_t *look)
 {
-    double to[2], mid[2], J[4], cov[3], rise_px[2];
-    if (!(oc_homography_apply(s->H, at[0], at[1], &to[0], &to[1]) > 0.0)) return false;
-    if (oc_homography_jacobian(s->H, at[0], at[1], J) != OC_OK) return false;
-    const double area = J[0] * J[3] - J[1] * J[2];
-    if (!(area < MAX_AREA_RATIO && area > 1.0 / MAX_AREA_RATIO)) return false;
-    if (!place_covariance(s, at, to, J, cov)) return false;
-    if (!(2.58 * 2.58 * cov_largest(cov) <= (double)(params->t_transfer_px * params->t_transfer_px))) return false;
-    if (oc_ground_rise(s->pair, at[0], at[1], params->t_h_m, rise_px) != OC_OK) return false;
-
+    place_t place;
+    double mid[2], x, y;
     ground_patch_t patch;
     ground_lookup_t found;
+    look->is_done = false;
+    if (!place_find(s, at, &place)) return false;
+    const double reach2 = (double)(params->t_transfer_px * params->t_transfer_px);
+    if (!(2.58 * 2.58 * cov_largest(place.cov) <= reach2)) return false;
     if (!window_place(s, params->window_px, at, mid)) return false;
     if (!oc_ground_patch_take(&s->from->grey, mid[0], mid[1], params->window_px, &patch)) return false;
     oc_ground_look_up(&patch, mid, &s->to->grey, s->H, s->noise_sd, &found);
     if (!found.is_inside) return false;
 
-    const double shift[2] = {(double)found.shift_px[0], (double)found.shift_px[1]};
-    const double off_px[2] = {J[0] * shift[0] + J[1] * shift[1], J[2] * shift[0] + J[3] * shift[1]};
-    const double shift_cov[3] = {(double)found.cov_px2[0], (double)found.cov_px2[1], (double)found.cov_px2[2]};
-    double seen_cov[3];
-    cov_carry(J, shift_cov, seen_cov);
-    seen_cov[0] += SHIFT_FLOOR_PX * SHIFT_FLOOR_PX;
-    seen_cov[2] += SHIFT_FLOOR_PX * SHIFT_FLOOR_PX;
-    for (int k = 0; k < 3; k++) cov[k] += seen_cov[k];
-    const double share = uneven_share(s, params->t_h_m);
-    look->l = weigh(&found, off_px, cov, rise_px, share);
-    return pin_make(s, mid, shift, seen_cov, rise_px, share, &look->pin);
+    const double there[2] = {mid[0] + (double)found.shift_px[0], mid[1] + (double)found.shift_px[1]};
+    const double cov[3] = {(double)found.cov_px2[0], (double)found.cov_px2[1], (double)found.cov_px2[2]};
+    double cov_there[3];
+    if (oc_homography_apply(s->H, there[0], there[1], &x, &y) == 0.0) return false;
+    cov_carry(place.J, cov, cov_there);
+    const double floor2 = SHIFT_FLOOR_PX * SHIFT_FLOOR_PX;
+    *look = (oc_ground_look_t){
+        .is_done = true,
+        .is_lost = found.is_at_border,
+        .ncc = found.ncc,
+        .worst_block = found.worst_block,
+        .mid_px = {(float)mid[0], (float)mid[1]},
+        .found_px = {(float)x, (float)y},
+        .cov_px2 = {(float)(cov_there[0] + floor2), (float)cov_there[1], (float)(cov_there[2] + floor2)}};
+    return true;
+}
+
+bool oc_ground_weigh(const sight_t *s, const oc_ground_params_t *params, const double at[2],
+                     const oc_ground_look_t *look, double *l, oc_ground_pin_t *pin)
+{
+    place_t place;
+    double x, y, rise_px[2];
+    const double mid[2] = {(double)look->mid_px[0], (double)look->mid_px[1]};
+    if (!look->is_done || !place_find(s, at, &place)) return false;
+    if (oc_ground_rise(s->pair, at[0], at[1], params->t_h_m, rise_px) != OC_OK) return false;
+    if (oc_homography_apply(s->H, mid[0], mid[1], &x, &y) == 0.0) return false;
+
+    const double off_px[2] = {(double)look->found_px[0] - x, (double)look->found_px[1] - y};
+    double cov[3];
+    for (int k = 0; k < 3; k++) cov[k] = place.cov[k] + (double)look->cov_px2[k];
+    const double uneven = uneven_share(s, params->t_h_m);
+    *l = weigh(look, off_px, cov, rise_px, uneven);
+
+    /* As a pin: uneven ground counts as noise on both axes. */
+    const double uneven2 = uneven * uneven * (rise_px[0] * rise_px[0] + rise_px[1] * rise_px[1]);
+    *pin = (oc_ground_pin_t){
+        .x_px = look->mid_px[0],
+        .y_px = look->mid_px[1],
+        .x2_px = look->found_px[0],
+        .y2_px = look->found_px[1],
+        .variance_px2 = (float)(0.5 * ((double)(look->cov_px2[0] + look->cov_px2[2]) + uneven2))};
+    return true;
 }

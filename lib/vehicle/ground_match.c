@@ -115,17 +115,22 @@ static uint32_t pair_up(oc_ground_ws_t *ws, const oc_ground_params_t *params, co
 
 /* ---- votes ---- */
 
-/* Add what the other view says about each junction. is_ground: it says ground, and clearly. */
-static void judge_all(const sight_t *s, const oc_ground_params_t *params, oc_ground_votes_t votes[],
-                      uint8_t is_ground[])
+/* Add what the other view says about each junction; looks that were made before
+ * are weighed again, not made again. looks may be NULL. is_ground: it says ground, and clearly. */
+static void judge_all(const sight_t *s, const oc_ground_params_t *params, const oc_ground_look_t looks[],
+                      oc_ground_votes_t votes[], uint8_t is_ground[])
 {
     for (uint32_t i = 0; i < s->from->n_junctions; i++) {
         const double at[2] = {(double)s->from->junctions[i].x_px, (double)s->from->junctions[i].y_px};
-        ground_look_t look;
+        oc_ground_look_t look = {.is_done = false};
+        oc_ground_pin_t pin;
+        double l;
         is_ground[i] = 0;
-        if (!oc_ground_judge(s, params, at, &look)) continue;
-        oc_ground_vote(&votes[i], look.l);
-        is_ground[i] = look.l >= (double)params->t_ground;
+        if (looks) look = looks[i];
+        if (!look.is_done && !oc_ground_look(s, params, at, &look)) continue;
+        if (!oc_ground_weigh(s, params, at, &look, &l, &pin)) continue;
+        oc_ground_vote(&votes[i], l);
+        is_ground[i] = l >= (double)params->t_ground;
     }
 }
 
@@ -153,15 +158,18 @@ static void pins_from_matches(oc_ground_ws_t *ws, const oc_ground_params_t *para
     }
 }
 
-/* What was found on the ground as pins: pictures laid over each other, ten times better known than junctions. */
+/* What was found on the ground as pins: pictures laid over each other, ten times
+ * better known than junctions. Junctions that come into reach are looked at. */
 static void pins_from_looks(oc_ground_ws_t *ws, const oc_ground_params_t *params, const sight_t *s)
 {
     ws->n_pins = 0;
     for (uint32_t i = 0; i < s->from->n_junctions; i++) {
         const double at[2] = {(double)s->from->junctions[i].x_px, (double)s->from->junctions[i].y_px};
-        ground_look_t look;
-        if (!oc_ground_judge(s, params, at, &look) || !(look.l >= (double)params->t_ground)) continue;
-        ws->pins[ws->n_pins++] = look.pin;
+        oc_ground_look_t *look = &ws->looks[i];
+        double l;
+        if (!look->is_done && !oc_ground_look(s, params, at, look)) continue;
+        if (!oc_ground_weigh(s, params, at, look, &l, &ws->pins[ws->n_pins])) continue;
+        ws->n_pins += l >= (double)params->t_ground;
     }
 }
 
@@ -258,6 +266,7 @@ oc_status_t oc_ground_match_views(oc_ground_ws_t *ws, const oc_ground_params_t *
                            .H = pair.H,
                            .H_inv = pair.H_inv,
                            .noise_sd = noise_sd};
+    for (uint32_t i = 0; i < view->n_junctions; i++) ws->looks[i].is_done = false;
     for (int round = 0; round < REGISTER_ROUNDS; round++) {
         pins_from_looks(ws, params, &there);
         if (!oc_ground_refit(ws, params, view, reference, &pair, &found)) break;
@@ -275,8 +284,8 @@ oc_status_t oc_ground_match_views(oc_ground_ws_t *ws, const oc_ground_params_t *
                           .H_inv = pair.H,
                           .is_reverse = true,
                           .noise_sd = noise_sd};
-    judge_all(&there, params, votes, ws->view_ground);
-    judge_all(&back, params, ref_votes, ws->ref_ground);
+    judge_all(&there, params, ws->looks, votes, ws->view_ground);
+    judge_all(&back, params, NULL, ref_votes, ws->ref_ground);
     keep_ground_matches(ws, ws->view_ground, ws->ref_ground);
     *result = found;
     return OC_OK;

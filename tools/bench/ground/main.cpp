@@ -6,6 +6,8 @@
 #include <iostream>
 
 #include "labels.h"
+#include "core/junction.h"
+#include "speed.h"
 
 namespace {
 
@@ -37,6 +39,16 @@ int main(int argc, char **argv)
     labels->add_flag("--all", options.lists_all, "one line per junction");
     labels->add_option("--json", json_file, "also write the figures here");
 
+    auto *speed = app.add_subcommand("speed", "milliseconds a pair, each view against the one before it");
+    outcrop::bench::SpeedOptions speed_options;
+    speed->add_option("SITE", sites, "site folders")->required();
+    speed->add_option("--poses", speed_options.poses, "exact, or as outcrop-drive --perturb")->capture_default_str();
+    speed->add_option("--junctions", speed_options.n_junctions, "best of each view")
+        ->check(CLI::Range(1u, OC_MAX_JUNCTIONS))
+        ->capture_default_str();
+    speed->add_option("--repeats", speed_options.repeats, "the quickest counts")->check(CLI::Range(1, 1000));
+    speed->add_option("--json", json_file, "also write the figures here");
+
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError &e) {
@@ -49,6 +61,13 @@ int main(int argc, char **argv)
                 std::printf("%s\n", site.c_str());
                 options.site = site;
                 out[site] = outcrop::bench::measure_labels(options);
+            }
+        }
+        if (speed->parsed()) {
+            for (const std::string &site : sites) {
+                std::printf("%s\n", site.c_str());
+                speed_options.site = site;
+                out[site] = outcrop::bench::measure_speed(speed_options);
             }
         }
         write_json(json_file, out);
