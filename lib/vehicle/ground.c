@@ -110,9 +110,10 @@ double oc_ground_overlap(const oc_camera_t *view, const oc_camera_t *reference, 
 /* The clearest view counts in full, each other one this much. */
 #define OTHERS_SHARE 0.25
 
-/* Views that do not see it count at most this much together, nats: 3 % of the
- * ground is hidden from all but one. */
-#define MAX_AGAINST 3.5
+/* Views that do not see it count in full up to here, together, nats, and what
+ * goes beyond counts this much: what hides a place from one view hides it from the next. */
+#define FULL_AGAINST 2.5
+#define MORE_AGAINST_SHARE 0.1
 
 /* No view is surer than this, nats. */
 #define MAX_FOR 7.0
@@ -143,7 +144,8 @@ double oc_ground_evidence(const oc_ground_votes_t *votes)
 
     const double best = votes->best / UNITS_PER_NAT, others = (votes->sum - votes->best) / UNITS_PER_NAT;
     const double against = votes->against / UNITS_PER_NAT;
-    return best + OTHERS_SHARE * others - (against < MAX_AGAINST ? against : MAX_AGAINST);
+    const double more = against > FULL_AGAINST ? against - FULL_AGAINST : 0.0;
+    return best + OTHERS_SHARE * others - (against - more) - MORE_AGAINST_SHARE * more;
 }
 
 void oc_ground_decide(const oc_ground_params_t *params, const oc_ground_votes_t *votes, uint8_t *label,
