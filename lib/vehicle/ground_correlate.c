@@ -113,6 +113,34 @@ static bool window_warp(const oc_image_t *grey, const window_read_t *w, float *o
     return true;
 }
 
+/* 1 2 1 down and across: n + 2 rows and columns become n. out may be in. */
+static void window_smooth(const float *in, uint32_t in_stride, uint32_t n, float *out, uint32_t out_stride)
+{
+    float row[3][GROUND_WIDE_STRIDE];
+    for (uint32_t r = 0; r < n + 2u; r++) {
+        const float *p = in + r * in_stride;
+        float *q = row[r % 3u];
+        for (uint32_t c = 0; c < n; c++) q[c] = 0.25f * (p[c] + p[c + 2u]) + 0.5f * p[c + 1u];
+        if (r < 2u) continue;
+        const float *a = row[(r - 2u) % 3u], *b = row[(r - 1u) % 3u];
+        float *o = out + (r - 2u) * out_stride;
+        for (uint32_t c = 0; c < n; c++) o[c] = 0.25f * (a[c] + q[c]) + 0.5f * b[c];
+    }
+}
+
+/* Read n x n samples, n odd, smoothed or not. Scratch holds what smoothing needs round them. */
+static bool window_take(const oc_image_t *grey, const double H[9], const double at[2], uint32_t n, bool is_smooth,
+                        float scratch[GROUND_MAX_WIDE_PX * GROUND_WIDE_STRIDE], float *out, uint32_t out_stride)
+{
+    static const double still[2] = {0, 0};
+    window_read_t read = {.H = H, .at = at, .shift = still, .half = (int32_t)(n / 2u), .step = 1};
+    if (!is_smooth) return window_warp(grey, &read, out, out_stride);
+    read.half++;
+    if (!window_warp(grey, &read, scratch, GROUND_WIDE_STRIDE)) return false;
+    window_smooth(scratch, GROUND_WIDE_STRIDE, n, out, out_stride);
+    return true;
+}
+
 /* Zero mean, unit length; zeros behind the samples. Returns the standard deviation before. */
 static float window_normalise(float *v, uint32_t n)
 {
@@ -139,14 +167,13 @@ static float window_normalise(float *v, uint32_t n)
     return sqrtf(length2 / (float)(n * n));
 }
 
-bool oc_ground_patch_take(const oc_image_t *grey, double x_px, double y_px, uint32_t n, ground_patch_t *patch)
+bool oc_ground_patch_take(const oc_image_t *grey, const double at[2], uint32_t n, bool is_smooth,
+                          ground_patch_t *patch)
 {
     static const double same[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-    static const double still[2] = {0, 0};
-    const double at[2] = {x_px, y_px};
+    float scratch[GROUND_MAX_WIDE_PX * GROUND_WIDE_STRIDE];
     patch->n = n;
-    const window_read_t read = {.H = same, .at = at, .shift = still, .half = (int32_t)(n / 2u), .step = 1};
-    if (!window_warp(grey, &read, patch->v, GROUND_PATCH_STRIDE)) return false;
+    if (!window_take(grey, same, at, n, is_smooth, scratch, patch->v, GROUND_PATCH_STRIDE)) return false;
     patch->sd = window_normalise(patch->v, n);
     return patch->sd >= MIN_SD;
 }
@@ -377,18 +404,17 @@ static float blocks_worst(const ground_patch_t *patch, const float *window, floa
 }
 
 /* From the peak over whole pixels to a fraction of one, by least squares; and
- * how the window agrees there. window: scratch. */
+ * how the window agrees there. scratch: contents are lost. */
 static void shift_refine(const ground_patch_t *patch, const double at[2], const oc_image_t *grey, const double H[9],
-                         float noise_sd, float *window, ground_lookup_t *found)
+                         const ground_photo_t *photo, float scratch[GROUND_MAX_WIDE_PX * GROUND_WIDE_STRIDE],
+                         ground_lookup_t *found)
 {
-    static const double still[2] = {0, 0};
-    float step[2] = {0.0f, 0.0f};
+    const uint32_t n = patch->n;
+    float window[OC_MAX_GROUND_WINDOW_PX * GROUND_PATCH_STRIDE], step[2] = {0.0f, 0.0f};
     for (int round = 0; round < 2; round++) {
         const double there[2] = {at[0] + (double)found->shift_px[0], at[1] + (double)found->shift_px[1]};
-        const window_read_t read = {
-            .H = H, .at = there, .shift = still, .half = (int32_t)(patch->n / 2u), .step = 1};
-        if (!window_warp(grey, &read, window, GROUND_PATCH_STRIDE)) return;
-        if (window_normalise(window, patch->n) < MIN_SD) return;
+        if (!window_take(grey, H, there, n, photo->is_smooth, scratch, window, GROUND_PATCH_STRIDE)) return;
+        if (window_normalise(window, n) < MIN_SD) return;
         const float ncc = window_product(patch, window, GROUND_PATCH_STRIDE);
         if (round > 0 && ncc < found->ncc) { /* a step too far */
             found->shift_px[0] -= step[0];
@@ -396,7 +422,7 @@ static void shift_refine(const ground_patch_t *patch, const double at[2], const 
             return;
         }
         found->ncc = ncc;
-        found->worst_block = blocks_worst(patch, window, noise_sd);
+        found->worst_block = blocks_worst(patch, window, (float)photo->noise_sd);
         if (!shift_step(patch, window, step, found->cov_px2)) return;
         if (round == 1 || !(fabsf(step[0]) <= 0.7f && fabsf(step[1]) <= 0.7f)) return;
         found->shift_px[0] += step[0];
@@ -405,22 +431,20 @@ static void shift_refine(const ground_patch_t *patch, const double at[2], const 
 }
 
 void oc_ground_look_up(const ground_patch_t *patch, const double at[2], const oc_image_t *grey, const double H[9],
-                       double noise_sd, ground_lookup_t *found)
+                       const ground_photo_t *photo, ground_lookup_t *found)
 {
-    static const double still[2] = {0, 0};
     *found = (ground_lookup_t){.is_inside = false, .ncc = -1.0f, .worst_block = -1.0f};
 
     float wide[GROUND_MAX_WIDE_PX * GROUND_WIDE_STRIDE];
     const uint32_t wide_n = patch->n + 2u * GROUND_SEARCH_PX;
-    const window_read_t read = {.H = H, .at = at, .shift = still, .half = (int32_t)(wide_n / 2u), .step = 1};
-    if (!window_warp(grey, &read, wide, GROUND_WIDE_STRIDE)) return;
+    if (!window_take(grey, H, at, wide_n, photo->is_smooth, wide, wide, GROUND_WIDE_STRIDE)) return;
     found->is_inside = true;
     wide_centre(wide, wide_n);
     found->is_at_border = !peak_find(patch, wide, found);
-    if (!found->is_at_border) shift_refine(patch, at, grey, H, (float)noise_sd, wide, found);
+    if (!found->is_at_border) shift_refine(patch, at, grey, H, photo, wide, found);
 
     /* Noise in both windows lowers the correlation of what is the same. */
-    const float share = 0.5f * (float)(noise_sd * noise_sd) / (patch->sd * patch->sd);
+    const float share = 0.5f * (float)(photo->noise_sd * photo->noise_sd) / (patch->sd * patch->sd);
     const float ncc = found->ncc / (1.0f - (share < MAX_NOISE_SHARE ? share : MAX_NOISE_SHARE));
     found->ncc = ncc < 1.0f ? ncc : 1.0f;
 }

@@ -8,9 +8,9 @@
 
 #define GROUND_PARAMS 12
 
-/* Sides of a look-up: the junction's patch is sought this far round its place. */
+/* A look-up seeks the junction's patch this far round its place; smoothing needs one more on each side. */
 #define GROUND_SEARCH_PX 3
-#define GROUND_MAX_WIDE_PX (OC_MAX_GROUND_WINDOW_PX + 2u * GROUND_SEARCH_PX)
+#define GROUND_MAX_WIDE_PX (OC_MAX_GROUND_WINDOW_PX + 2u * GROUND_SEARCH_PX + 2u)
 
 /* ---- the pair's geometry (ground_ransac.c, ground_homography.c) ---- */
 
@@ -62,8 +62,15 @@ typedef struct ground_patch {
     float v[OC_MAX_GROUND_WINDOW_PX * GROUND_PATCH_STRIDE];
 } ground_patch_t;
 
-/* The image's own window round (x, y). False when it does not fit inside or is flat. */
-bool oc_ground_patch_take(const oc_image_t *grey, double x_px, double y_px, uint32_t n, ground_patch_t *patch);
+/* How two pictures are compared. */
+typedef struct ground_photo {
+    double noise_sd; /* of both together, grey levels, after smoothing */
+    bool is_smooth;  /* 3 x 3 binomial first: what blur, noise and codecs do to one picture only then matters less */
+} ground_photo_t;
+
+/* The image's own window round a pixel. False when it does not fit inside or is flat. */
+bool oc_ground_patch_take(const oc_image_t *grey, const double at[2], uint32_t n, bool is_smooth,
+                          ground_patch_t *patch);
 
 /* Correlation of a patch, taken round `at`, with the image that H' leads to
  * from there, H' being H anchored to send `at` to `to` (thesis Eq 4.36-4.40). -1 when the
@@ -81,9 +88,9 @@ typedef struct ground_lookup {
     float cov_px2[3];   /* of the shift, from the picture alone: xx, xy, yy */
 } ground_lookup_t;
 
-/* noise_sd: of both images together, grey levels; lifts the correlation to what it would be without noise. */
+/* The patch must have been taken as photo says. The correlation is lifted to what it would be without noise. */
 void oc_ground_look_up(const ground_patch_t *patch, const double at[2], const oc_image_t *grey, const double H[9],
-                       double noise_sd, ground_lookup_t *found);
+                       const ground_photo_t *photo, ground_lookup_t *found);
 
 /* Standard deviation of the noise of an image, grey levels, from its flatter parts. */
 double oc_ground_noise_sd(const oc_image_t *grey);
@@ -97,7 +104,7 @@ typedef struct sight {
     const ground_pair_t *forward; /* the pair as it was fitted */
     const double *H, *H_inv;      /* of pair */
     bool is_reverse;              /* forward's own left is `to` */
-    double noise_sd;              /* of both images together */
+    ground_photo_t photo;
 } sight_t;
 
 /* Look for what is at a pixel of `from` where the ground would be in `to`. False,

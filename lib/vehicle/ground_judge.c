@@ -67,7 +67,8 @@ static bool window_overshoot(const sight_t *s, const double mid[2], double half_
  * the border moves as the junction does. */
 static bool window_place(const sight_t *s, uint32_t n_px, const double at[2], double mid[2])
 {
-    const double half = n_px / 2u, reach = half - MIN_INSIDE_PX;
+    const double reach = n_px / 2u - MIN_INSIDE_PX; /* NOLINT(bugprone-integer-division) */
+    const double half = n_px / 2u + (s->photo.is_smooth ? 1.0 : 0.0);
     const double max_x = s->from->grey.width_px - 2.0 - half, max_y = s->from->grey.height_px - 2.0 - half;
     memcpy(mid, at, 2 * sizeof *mid);
     for (int round = 0; round < 3; round++) {
@@ -220,8 +221,8 @@ bool oc_ground_look(const sight_t *s, const oc_ground_params_t *params, const do
     const double reach2 = (double)(params->t_transfer_px * params->t_transfer_px);
     if (!(2.58 * 2.58 * cov_largest(place.cov) <= reach2)) return false;
     if (!window_place(s, params->window_px, at, mid)) return false;
-    if (!oc_ground_patch_take(&s->from->grey, mid[0], mid[1], params->window_px, &patch)) return false;
-    oc_ground_look_up(&patch, mid, &s->to->grey, s->H, s->noise_sd, &found);
+    if (!oc_ground_patch_take(&s->from->grey, mid, params->window_px, s->photo.is_smooth, &patch)) return false;
+    oc_ground_look_up(&patch, mid, &s->to->grey, s->H, &s->photo, &found);
     if (!found.is_inside) return false;
 
     const double there[2] = {mid[0] + (double)found.shift_px[0], mid[1] + (double)found.shift_px[1]};

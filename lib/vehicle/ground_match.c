@@ -14,6 +14,12 @@
 /* Times that the pair is fitted to what was found; the second reaches what the first brought into reach. */
 #define REGISTER_ROUNDS 2
 
+/* Ground that correlates less on average is not just resampled: blur, noise, a codec. */
+#define CLEAN_NCC 0.97
+
+/* What the smoothing leaves of white noise. */
+#define SMOOTH_NOISE 0.375
+
 #define NO_MATCH UINT16_MAX
 
 /* ---- pairing junctions ---- */
@@ -71,7 +77,7 @@ static uint32_t pair_one(oc_ground_ws_t *ws, const pairing_t *how, uint32_t n_px
     gate_t gate;
     ground_patch_t patch, back_patch;
     if (!gate_open(how, at, &gate)) return 0;
-    if (!oc_ground_patch_take(&how->left->grey, at[0], at[1], n_px, &patch)) return 0;
+    if (!oc_ground_patch_take(&how->left->grey, at, n_px, false, &patch)) return 0;
 
     uint32_t n_candidates = 0;
     for (uint32_t j = 0; j < how->right->n_junctions; j++) {
@@ -81,7 +87,7 @@ static uint32_t pair_one(oc_ground_ws_t *ws, const pairing_t *how, uint32_t n_px
         n_candidates++;
         const float there = oc_ground_correlate(&patch, at, &how->right->grey, how->H, to);
         if (there < how->t_ncc) continue;
-        if (!oc_ground_patch_take(&how->right->grey, to[0], to[1], n_px, &back_patch)) continue;
+        if (!oc_ground_patch_take(&how->right->grey, to, n_px, false, &back_patch)) continue;
         const float back = oc_ground_correlate(&back_patch, to, &how->left->grey, how->H_inv, at);
         if (back < how->t_ncc) continue;
         pair_score(ws, i, j, back < there ? back : there);
@@ -159,9 +165,11 @@ static void pins_from_matches(oc_ground_ws_t *ws, const oc_ground_params_t *para
 }
 
 /* What was found on the ground as pins: pictures laid over each other, ten times
- * better known than junctions. Junctions that come into reach are looked at. */
-static void pins_from_looks(oc_ground_ws_t *ws, const oc_ground_params_t *params, const sight_t *s)
+ * better known than junctions. Junctions that come into reach are looked at.
+ * Returns the mean correlation of what was found. */
+static double pins_from_looks(oc_ground_ws_t *ws, const oc_ground_params_t *params, const sight_t *s)
 {
+    double sum = 0.0;
     ws->n_pins = 0;
     for (uint32_t i = 0; i < s->from->n_junctions; i++) {
         const double at[2] = {(double)s->from->junctions[i].x_px, (double)s->from->junctions[i].y_px};
@@ -169,7 +177,32 @@ static void pins_from_looks(oc_ground_ws_t *ws, const oc_ground_params_t *params
         double l;
         if (!look->is_done && !oc_ground_look(s, params, at, look)) continue;
         if (!oc_ground_weigh(s, params, at, look, &l, &ws->pins[ws->n_pins])) continue;
-        ws->n_pins += l >= (double)params->t_ground;
+        if (!(l >= (double)params->t_ground)) continue;
+        sum += (double)look->ncc;
+        ws->n_pins++;
+    }
+    return ws->n_pins > 0 ? sum / ws->n_pins : 1.0;
+}
+
+static void looks_forget(oc_ground_ws_t *ws, uint32_t n)
+{
+    for (uint32_t i = 0; i < n; i++) ws->looks[i].is_done = false;
+}
+
+/* Lay the pictures over each other, fit the pair to that, and again with what
+ * has come into reach. Decides on smoothing. */
+static void register_pictures(oc_ground_ws_t *ws, const oc_ground_params_t *params, sight_t *s, ground_pair_t *pair,
+                              oc_ground_result_t *found)
+{
+    looks_forget(ws, s->from->n_junctions);
+    for (int round = 0; round < REGISTER_ROUNDS; round++) {
+        const double agreement = pins_from_looks(ws, params, s);
+        if (round == 0 && agreement < CLEAN_NCC) {
+            s->photo = (ground_photo_t){.noise_sd = SMOOTH_NOISE * s->photo.noise_sd, .is_smooth = true};
+            looks_forget(ws, s->from->n_junctions);
+            (void)pins_from_looks(ws, params, s);
+        }
+        if (!oc_ground_refit(ws, params, s->from, s->to, pair, found)) break;
     }
 }
 
@@ -258,19 +291,15 @@ oc_status_t oc_ground_match_views(oc_ground_ws_t *ws, const oc_ground_params_t *
     pins_from_matches(ws, params, view, reference, pair.H);
     (void)oc_ground_refit(ws, params, view, reference, &pair, &found);
 
-    const double noise_sd = hypot(oc_ground_noise_sd(&view->grey), oc_ground_noise_sd(&reference->grey));
-    const sight_t there = {.from = view,
-                           .to = reference,
-                           .pair = &pair,
-                           .forward = &pair,
-                           .H = pair.H,
-                           .H_inv = pair.H_inv,
-                           .noise_sd = noise_sd};
-    for (uint32_t i = 0; i < view->n_junctions; i++) ws->looks[i].is_done = false;
-    for (int round = 0; round < REGISTER_ROUNDS; round++) {
-        pins_from_looks(ws, params, &there);
-        if (!oc_ground_refit(ws, params, view, reference, &pair, &found)) break;
-    }
+    sight_t there = {
+        .from = view,
+        .to = reference,
+        .pair = &pair,
+        .forward = &pair,
+        .H = pair.H,
+        .H_inv = pair.H_inv,
+        .photo = {.noise_sd = hypot(oc_ground_noise_sd(&view->grey), oc_ground_noise_sd(&reference->grey))}};
+    register_pictures(ws, params, &there, &pair, &found);
     ground_pair_t reverse = pair;
     reverse.left = pair.right;
     reverse.right = pair.left;
@@ -283,7 +312,7 @@ oc_status_t oc_ground_match_views(oc_ground_ws_t *ws, const oc_ground_params_t *
                           .H = pair.H_inv,
                           .H_inv = pair.H,
                           .is_reverse = true,
-                          .noise_sd = noise_sd};
+                          .photo = there.photo};
     judge_all(&there, params, ws->looks, votes, ws->view_ground);
     judge_all(&back, params, NULL, ref_votes, ws->ref_ground);
     keep_ground_matches(ws, ws->view_ground, ws->ref_ground);
