@@ -42,11 +42,11 @@ bool oc_ground_params_are_valid(const oc_ground_params_t *params)
     const oc_ground_params_t *p = params;
     return p->window_px >= 7 && p->window_px <= OC_MAX_GROUND_WINDOW_PX && p->window_px % 2u == 1u && p->t_g >= 0.3f &&
            p->t_g <= 1.0f && p->t_g_second >= 0.3f && p->t_g_second <= 1.0f && p->t_ground >= 0.5f &&
-           p->t_ground <= 10.0f && p->t_obstacle >= 0.1f && p->t_obstacle <= 10.0f && p->t_transfer_px >= 0.5f && p->t_transfer_px <= 10.0f && p->t_h_m > 0.0 &&
-           p->t_h_m <= 10.0 && p->window_chi2 >= 1.0 && p->window_chi2 <= 50.0 && p->sigma_px >= 0.05 &&
-           p->sigma_px <= 5.0 && p->ransac_rounds >= 10 && p->ransac_rounds <= 5000 && p->min_inliers >= 6 &&
-           p->min_inliers <= 1000 && p->max_references >= 1 && p->max_references <= OC_MAX_GROUND_REFERENCES &&
-           p->max_ties <= OC_MAX_TIES;
+           p->t_ground <= 10.0f && p->t_obstacle >= 0.1f && p->t_obstacle <= 10.0f && p->t_transfer_px >= 0.5f &&
+           p->t_transfer_px <= 10.0f && p->t_h_m > 0.0 && p->t_h_m <= 10.0 && p->window_chi2 >= 1.0 &&
+           p->window_chi2 <= 50.0 && p->sigma_px >= 0.05 && p->sigma_px <= 5.0 && p->ransac_rounds >= 10 &&
+           p->ransac_rounds <= 5000 && p->min_inliers >= 6 && p->min_inliers <= 1000 && p->max_references >= 1 &&
+           p->max_references <= OC_MAX_GROUND_REFERENCES && p->max_ties <= OC_MAX_TIES;
 }
 
 /* ---- which views can judge each other ---- */

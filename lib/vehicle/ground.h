@@ -105,7 +105,7 @@ typedef struct oc_ground_ws {
     oc_ground_pin_t pins[OC_MAX_JUNCTIONS]; /* what the homography is fitted to */
     uint32_t n_pins;
     oc_ground_look_t looks[OC_MAX_JUNCTIONS]; /* from the view's junctions to the reference */
-    uint8_t is_inlier[OC_MAX_JUNCTIONS]; /* of pins */
+    uint8_t is_inlier[OC_MAX_JUNCTIONS];      /* of pins */
     uint16_t best_right[OC_MAX_JUNCTIONS], best_left[OC_MAX_JUNCTIONS];
     float ncc_right[OC_MAX_JUNCTIONS], ncc_left[OC_MAX_JUNCTIONS];
     uint8_t view_ground[OC_MAX_JUNCTIONS], ref_ground[OC_MAX_JUNCTIONS];

@@ -167,8 +167,7 @@ static float window_normalise(float *v, uint32_t n)
     return sqrtf(length2 / (float)(n * n));
 }
 
-bool oc_ground_patch_take(const oc_image_t *grey, const double at[2], uint32_t n, bool is_smooth,
-                          ground_patch_t *patch)
+bool oc_ground_patch_take(const oc_image_t *grey, const double at[2], uint32_t n, bool is_smooth, ground_patch_t *patch)
 {
     static const double same[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     float scratch[GROUND_MAX_WIDE_PX * GROUND_WIDE_STRIDE];

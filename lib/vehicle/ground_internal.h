@@ -80,12 +80,12 @@ float oc_ground_correlate(const ground_patch_t *patch, const double at[2], const
 
 /* Where a patch is best found round the place H sends it to. */
 typedef struct ground_lookup {
-    bool is_inside;     /* the sought window was wholly inside */
-    bool is_at_border;  /* the peak is at the end of the search: no shift and no blocks */
-    float ncc;          /* at the peak */
-    float worst_block;  /* agreement of the window's worst ninth with its own contrast, <= 1 */
-    float shift_px[2];  /* peak from the expected place, pixels of the patch's own image, sub-pixel */
-    float cov_px2[3];   /* of the shift, from the picture alone: xx, xy, yy */
+    bool is_inside;    /* the sought window was wholly inside */
+    bool is_at_border; /* the peak is at the end of the search: no shift and no blocks */
+    float ncc;         /* at the peak */
+    float worst_block; /* agreement of the window's worst ninth with its own contrast, <= 1 */
+    float shift_px[2]; /* peak from the expected place, pixels of the patch's own image, sub-pixel */
+    float cov_px2[3];  /* of the shift, from the picture alone: xx, xy, yy */
 } ground_lookup_t;
 
 /* The patch must have been taken as photo says. The correlation is lifted to what it would be without noise. */

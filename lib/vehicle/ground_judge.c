@@ -260,11 +260,10 @@ bool oc_ground_weigh(const sight_t *s, const oc_ground_params_t *params, const d
 
     /* As a pin: uneven ground counts as noise on both axes. */
     const double uneven2 = uneven * uneven * (rise_px[0] * rise_px[0] + rise_px[1] * rise_px[1]);
-    *pin = (oc_ground_pin_t){
-        .x_px = look->mid_px[0],
-        .y_px = look->mid_px[1],
-        .x2_px = look->found_px[0],
-        .y2_px = look->found_px[1],
-        .variance_px2 = (float)(0.5 * ((double)(look->cov_px2[0] + look->cov_px2[2]) + uneven2))};
+    *pin = (oc_ground_pin_t){.x_px = look->mid_px[0],
+                             .y_px = look->mid_px[1],
+                             .x2_px = look->found_px[0],
+                             .y2_px = look->found_px[1],
+                             .variance_px2 = (float)(0.5 * ((double)(look->cov_px2[0] + look->cov_px2[2]) + uneven2))};
     return true;
 }

@@ -160,7 +160,8 @@ static double ransac_score(const oc_ground_ws_t *ws, const double H[9], double m
 {
     double inverse[9], sum = 0.0;
     if (oc_mat3_inverse(H, inverse) != OC_OK) return 0.0;
-    for (uint32_t i = 0; i < ws->n_pins; i++) sum += oc_ground_gain(scaled_error(&ws->design[4u * i], H, inverse, max2));
+    for (uint32_t i = 0; i < ws->n_pins; i++)
+        sum += oc_ground_gain(scaled_error(&ws->design[4u * i], H, inverse, max2));
     return sum;
 }
 
@@ -203,8 +204,8 @@ uint32_t oc_ground_ransac(oc_ground_ws_t *ws, const oc_ground_params_t *params, 
     /* Four noisy points miss others by more than a fit does: twice as much is still worth something. */
     const double max_error = 2.0 * (double)params->t_transfer_px * frame.scale;
     double H[9], inverse[9];
-    const double score = ransac_run(ws, params->ransac_rounds, random_seed(view->view, reference->view),
-                                    max_error * max_error, H);
+    const double score =
+        ransac_run(ws, params->ransac_rounds, random_seed(view->view, reference->view), max_error * max_error, H);
     if (!(score > 0.0) || oc_mat3_inverse(H, inverse) != OC_OK) return 0;
     uint32_t n = 0;
     for (uint32_t i = 0; i < ws->n_pins; i++) {

@@ -81,7 +81,8 @@ double height_m(const eval::Truth &truth, std::size_t view, const Eigen::Vector2
     double highest = 0;
     for (int dy = -2; dy <= 2; dy++)
         for (int dx = -2; dx <= 2; dx++) {
-            const int x = static_cast<int>(std::lround(pixel.x())) + dx, y = static_cast<int>(std::lround(pixel.y())) + dy;
+            const int x = static_cast<int>(std::lround(pixel.x())) + dx,
+                      y = static_cast<int>(std::lround(pixel.y())) + dy;
             if (x < 0 || y < 0 || x >= map.mask.cols || y >= map.mask.rows) continue;
             if (!eval::is_obstacle_code(map.mask.at<std::uint8_t>(y, x))) continue;
             const double depth = static_cast<double>(map.depth_m.at<float>(y, x));
@@ -104,7 +105,9 @@ void list_junctions(const eval::Truth &truth, const Labelled &labelled, bool is_
             if (!is_all && is_ground == (j.label == eval::Label::kGround)) continue;
             std::printf("    view %2zu (%9.4f, %9.4f) %-8s is %s, confidence %.2f, obstacle to %.3f m\n", view.view,
                         j.px.x(), j.px.y(), names[static_cast<int>(j.label)],
-                        is_seen_twice ? "ground_seen_twice" : is_ground ? "ground" : "not_ground",
+                        is_seen_twice ? "ground_seen_twice"
+                        : is_ground   ? "ground"
+                                      : "not_ground",
                         labelled.confidence[v][i], height_m(truth, view.view, j.px));
         }
     }
@@ -121,7 +124,8 @@ Json judge(const eval::Truth &truth, const Labelled &labelled)
         if (!depth) continue;
         for (std::size_t i = 0; i < labelled.views[v].junctions.size(); i++) {
             const eval::FoundJunction &j = labelled.views[v].junctions[i];
-            const bool is_ground = eval::is_true_ground(*depth, j.px), is_obstacle = eval::is_true_obstacle(*depth, j.px);
+            const bool is_ground = eval::is_true_ground(*depth, j.px),
+                       is_obstacle = eval::is_true_obstacle(*depth, j.px);
             const double confidence = labelled.confidence[v][i];
             n_true_ground += is_ground;
             n_obstacle += is_obstacle;
@@ -137,7 +141,8 @@ Json judge(const eval::Truth &truth, const Labelled &labelled)
             {"precision", maybe(m.precision)},
             {"recall", maybe(m.recall)},
             {"obstacle_as_ground", maybe(m.obstacle_as_ground)},
-            {"ground_as_obstacle", n_true_ground ? Json(static_cast<double>(called_obstacle) / n_true_ground) : Json(nullptr)},
+            {"ground_as_obstacle",
+             n_true_ground ? Json(static_cast<double>(called_obstacle) / n_true_ground) : Json(nullptr)},
             {"obstacle_open", n_obstacle ? Json(static_cast<double>(obstacle_open) / n_obstacle) : Json(nullptr)},
             {"confidence_ground", ground.json()},
             {"confidence_obstacle", obstacle.json()}};

@@ -12,10 +12,10 @@ namespace outcrop::bench {
 
 struct LabelOptions {
     std::string site;
-    std::string images;                            /* folder name instead of the views' own, or "" */
-    std::vector<std::string> modes = {"exact"};    /* "exact", or as --perturb of outcrop-drive: "1", "2:drift" */
-    bool lists_errors = false;                     /* one line per wrong label */
-    bool lists_all = false;                        /* one line per junction */
+    std::string images;                         /* folder name instead of the views' own, or "" */
+    std::vector<std::string> modes = {"exact"}; /* "exact", or as --perturb of outcrop-drive: "1", "2:drift" */
+    bool lists_errors = false;                  /* one line per wrong label */
+    bool lists_all = false;                     /* one line per junction */
 };
 
 /* One run per mode, each a row of the printed table and an object of the answer:

@@ -36,9 +36,9 @@ std::vector<GroundView> ground_views(const Scene &scene, unsigned n_junctions)
     for (std::size_t i = 0; i < out.size(); i++) { // the vectors have found their places
         const oc_frame_t &frame = scene.frames[i].frame;
         const std::uint32_t w = frame.image.width_px, h = frame.image.height_px;
-        out[i].view = {frame.view_id,       {out[i].grey.data(), w, h, w, 1},
-                       frame.camera,        frame.margin,
-                       out[i].junctions.data(), static_cast<std::uint32_t>(out[i].junctions.size())};
+        out[i].view = {
+            frame.view_id, {out[i].grey.data(), w, h, w, 1}, frame.camera,
+            frame.margin,  out[i].junctions.data(),          static_cast<std::uint32_t>(out[i].junctions.size())};
     }
     return out;
 }

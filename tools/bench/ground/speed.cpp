@@ -30,8 +30,8 @@ Timed time_pair(oc_ground_ws_t *ws, const GroundView &left, const GroundView &ri
     for (unsigned i = 0; i < repeats; i++) {
         std::vector<oc_ground_votes_t> votes(OC_MAX_JUNCTIONS), other_votes(OC_MAX_JUNCTIONS);
         const auto begin = Clock::now();
-        const oc_status_t status = oc_ground_match_views(ws, &params, &left.view, &right.view, votes.data(),
-                                                         other_votes.data(), &out.result);
+        const oc_status_t status =
+            oc_ground_match_views(ws, &params, &left.view, &right.view, votes.data(), other_votes.data(), &out.result);
         out.ms = std::min(out.ms, std::chrono::duration<double, std::milli>(Clock::now() - begin).count());
         if (status != OC_OK) throw std::runtime_error(oc_status_text(status));
     }
@@ -50,8 +50,8 @@ Json measure_speed(const SpeedOptions &options)
     const auto ws = std::make_unique<oc_ground_ws_t>();
     Json pairs = Json::array();
     std::vector<double> all_ms;
-    std::printf("%5s %5s %11s %10s %8s %7s %8s %7s %8s\n", "left", "right", "junctions", "candidates", "matches", "pins",
-                "inliers", "rms px", "ms");
+    std::printf("%5s %5s %11s %10s %8s %7s %8s %7s %8s\n", "left", "right", "junctions", "candidates", "matches",
+                "pins", "inliers", "rms px", "ms");
     for (std::size_t i = 1; i < views.size(); i++) {
         const oc_ground_view_t &left = views[i].view, &right = views[i - 1].view;
         const Timed t = time_pair(ws.get(), views[i], views[i - 1], options.repeats);
