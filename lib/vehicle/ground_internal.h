@@ -6,6 +6,10 @@
 #include "core/window.h"
 #include "vehicle/ground.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define GROUND_PARAMS 12
 
 /* A look-up seeks the junction's patch this far round its place; smoothing needs one more on each side. */
@@ -109,11 +113,14 @@ typedef struct sight {
 
 /* Look for what is at a pixel of `from` where the ground would be in `to`. False,
  * and look->is_done false, when that cannot be done: outside, too oblique, place not known. */
-bool oc_ground_look(const sight_t *s, const oc_ground_params_t *params, const double at[2], oc_ground_look_t *look);
+bool oc_ground_look_at(const sight_t *s, const oc_ground_params_t *params, const double at[2], oc_ground_look_t *look);
 
 /* What a look says, with the pair as it now stands: l, the log-likelihood ratio
  * of ground against the rest, natural logarithm; and where the window was found. False when it says nothing. */
 bool oc_ground_weigh(const sight_t *s, const oc_ground_params_t *params, const double at[2],
                      const oc_ground_look_t *look, double *l, oc_ground_pin_t *pin);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -210,7 +210,7 @@ static bool place_find(const sight_t *s, const double at[2], place_t *place)
     return place_covariance(s, at, place->to, place->J, place->cov);
 }
 
-bool oc_ground_look(const sight_t *s, const oc_ground_params_t *params, const double at[2], oc_ground_look_t *look)
+bool oc_ground_look_at(const sight_t *s, const oc_ground_params_t *params, const double at[2], oc_ground_look_t *look)
 {
     place_t place;
     double mid[2], x, y;

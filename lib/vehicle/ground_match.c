@@ -133,7 +133,7 @@ static void judge_all(const sight_t *s, const oc_ground_params_t *params, const 
         double l;
         is_ground[i] = 0;
         if (looks) look = looks[i];
-        if (!look.is_done && !oc_ground_look(s, params, at, &look)) continue;
+        if (!look.is_done && !oc_ground_look_at(s, params, at, &look)) continue;
         if (!oc_ground_weigh(s, params, at, &look, &l, &pin)) continue;
         oc_ground_vote(&votes[i], l);
         is_ground[i] = l >= (double)params->t_ground;
@@ -175,7 +175,7 @@ static double pins_from_looks(oc_ground_ws_t *ws, const oc_ground_params_t *para
         const double at[2] = {(double)s->from->junctions[i].x_px, (double)s->from->junctions[i].y_px};
         oc_ground_look_t *look = &ws->looks[i];
         double l;
-        if (!look->is_done && !oc_ground_look(s, params, at, look)) continue;
+        if (!look->is_done && !oc_ground_look_at(s, params, at, look)) continue;
         if (!oc_ground_weigh(s, params, at, look, &l, &ws->pins[ws->n_pins])) continue;
         if (!(l >= (double)params->t_ground)) continue;
         sum += (double)look->ncc;

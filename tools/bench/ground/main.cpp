@@ -8,6 +8,7 @@
 #include "labels.h"
 #include "core/junction.h"
 #include "speed.h"
+#include "table.h"
 
 namespace {
 
@@ -49,6 +50,17 @@ int main(int argc, char **argv)
     speed->add_option("--repeats", speed_options.repeats, "the quickest counts")->check(CLI::Range(1, 1000));
     speed->add_option("--json", json_file, "also write the figures here");
 
+    auto *table = app.add_subcommand("table", "table 4.1 of the thesis: windows by t_g, the thesis' form and ours");
+    outcrop::bench::TableOptions table_options;
+    table->add_option("SITE", table_options.site, "site folder (the thesis': cubes)")->required();
+    table->add_option("--poses", table_options.poses, "exact, or as outcrop-drive --perturb")->capture_default_str();
+    table->add_option("--left", table_options.left, "view")->capture_default_str();
+    table->add_option("--right", table_options.right, "view")->capture_default_str();
+    table->add_option("--junctions", table_options.n_junctions, "best of each view")
+        ->check(CLI::Range(1u, OC_MAX_JUNCTIONS))
+        ->capture_default_str();
+    table->add_option("--json", json_file, "also write the figures here");
+
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError &e) {
@@ -70,6 +82,7 @@ int main(int argc, char **argv)
                 out[site] = outcrop::bench::measure_speed(speed_options);
             }
         }
+        if (table->parsed()) out = outcrop::bench::measure_table(table_options);
         write_json(json_file, out);
     } catch (const std::exception &e) {
         std::cerr << "outcrop-bench-ground: " << e.what() << '\n';
