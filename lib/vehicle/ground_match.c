@@ -28,33 +28,30 @@
 typedef struct pairing {
     const oc_ground_view_t *left, *right;
     const double *H, *H_inv;
-    const oc_pair_t *window; /* NULL: within radius_px of the transfer */
-    double radius_px;
-    double chi2;
+    const oc_pair_t *prior;       /* windows of the margins, or NULL: */
+    const ground_pair_t *refined; /* of what the fit has left of them */
+    double sigma_px, chi2;
     float t_ncc;
 } pairing_t;
 
-typedef struct gate {
-    oc_window_t window;
-    bool has_window;
-    double to[2], radius2;
-    double chi2;
-} gate_t;
-
-static bool gate_open(const pairing_t *how, const double at[2], gate_t *gate)
+static bool window_open(const pairing_t *how, const double at[2], oc_window_t *window)
 {
-    gate->has_window = how->window != NULL;
-    gate->chi2 = how->chi2;
-    gate->radius2 = how->radius_px * how->radius_px;
-    if (gate->has_window) return oc_window_ground(how->window, at[0], at[1], &gate->window) == OC_OK;
-    return oc_homography_apply(how->H, at[0], at[1], &gate->to[0], &gate->to[1]) > 0.0;
-}
-
-static bool gate_passes(const gate_t *gate, const double to[2])
-{
-    if (gate->has_window) return oc_window_d2(&gate->window, to[0], to[1]) < gate->chi2;
-    const double dx = to[0] - gate->to[0], dy = to[1] - gate->to[1];
-    return dx * dx + dy * dy < gate->radius2;
+    if (how->prior) return oc_window_ground(how->prior, at[0], at[1], window) == OC_OK;
+    double J[4];
+    double *cov = window->cov_px2;
+    if (!(oc_homography_apply(how->H, at[0], at[1], &window->x_px, &window->y_px) > 0.0)) return false;
+    if (oc_homography_jacobian(how->H, at[0], at[1], J) != OC_OK) return false;
+    if (!oc_ground_transfer_covariance(how->refined, at[0], at[1], cov)) return false;
+    const double noise2 = how->sigma_px * how->sigma_px;
+    cov[0] += noise2 * (1.0 + J[0] * J[0] + J[1] * J[1]);
+    cov[1] += noise2 * (J[0] * J[2] + J[1] * J[3]);
+    cov[2] += noise2 * (1.0 + J[2] * J[2] + J[3] * J[3]);
+    const double det = cov[0] * cov[2] - cov[1] * cov[1];
+    if (!(det > 0.0)) return false;
+    window->info[0] = cov[2] / det;
+    window->info[1] = -cov[1] / det;
+    window->info[2] = cov[0] / det;
+    return true;
 }
 
 static void pair_score(oc_ground_ws_t *ws, uint32_t i, uint32_t j, float score)
@@ -74,16 +71,16 @@ static uint32_t pair_one(oc_ground_ws_t *ws, const pairing_t *how, uint32_t n_px
 {
     const oc_junction_t *a = &how->left->junctions[i];
     const double at[2] = {(double)a->x_px, (double)a->y_px};
-    gate_t gate;
+    oc_window_t window;
     ground_patch_t patch, back_patch;
-    if (!gate_open(how, at, &gate)) return 0;
+    if (!window_open(how, at, &window)) return 0;
     if (!oc_ground_patch_take(&how->left->grey, at, n_px, false, &patch)) return 0;
 
     uint32_t n_candidates = 0;
     for (uint32_t j = 0; j < how->right->n_junctions; j++) {
         const oc_junction_t *b = &how->right->junctions[j];
         const double to[2] = {(double)b->x_px, (double)b->y_px};
-        if (!gate_passes(&gate, to)) continue;
+        if (!(oc_window_d2(&window, to[0], to[1]) < how->chi2)) continue;
         n_candidates++;
         const float there = oc_ground_correlate(&patch, at, &how->right->grey, how->H, to);
         if (there < how->t_ncc) continue;
@@ -234,7 +231,7 @@ static oc_status_t first_pass(oc_ground_ws_t *ws, const oc_ground_params_t *para
                            .right = reference,
                            .H = prepared.H,
                            .H_inv = H_inv,
-                           .window = &prepared,
+                           .prior = &prepared,
                            .chi2 = params->window_chi2,
                            .t_ncc = params->t_g};
     result->n_candidates = pair_up(ws, params, &how);
@@ -280,12 +277,14 @@ oc_status_t oc_ground_match_views(oc_ground_ws_t *ws, const oc_ground_params_t *
         return OC_OK;
     }
 
-    /* Second pass: the refined homography leaves a window of t_H only. */
+    /* Second pass: the windows that the fit has left. */
     const pairing_t narrow = {.left = view,
                               .right = reference,
                               .H = pair.H,
                               .H_inv = pair.H_inv,
-                              .radius_px = (double)params->t_transfer_px,
+                              .refined = &pair,
+                              .sigma_px = params->sigma_px,
+                              .chi2 = params->window_chi2,
                               .t_ncc = params->t_g_second};
     (void)pair_up(ws, params, &narrow);
     pins_from_matches(ws, params, view, reference, pair.H);
