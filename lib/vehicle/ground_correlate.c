@@ -113,6 +113,25 @@ static bool window_warp(const oc_image_t *grey, const window_read_t *w, float *o
     return true;
 }
 
+/* Read an upright window of n x n samples, n odd: the same four weights everywhere. */
+static bool window_copy(const oc_image_t *grey, const double at[2], uint32_t n, float *out, uint32_t out_stride)
+{
+    const double half = n / 2u, x0 = at[0] - half, y0 = at[1] - half; /* NOLINT(bugprone-integer-division) */
+    const double x1 = at[0] + half, y1 = at[1] + half;
+    if (!(x0 >= 0.01 && y0 >= 0.01 && x1 <= grey->width_px - 1.01 && y1 <= grey->height_px - 1.01)) return false;
+    const uint32_t ix = (uint32_t)x0, iy = (uint32_t)y0;
+    const float ax = (float)(x0 - ix), ay = (float)(y0 - iy);
+    const float w00 = (1.0f - ax) * (1.0f - ay), w01 = ax * (1.0f - ay), w10 = (1.0f - ax) * ay, w11 = ax * ay;
+    for (uint32_t r = 0; r < n; r++) {
+        const uint8_t *p = grey->px + (size_t)(iy + r) * grey->stride_bytes + ix, *q = p + grey->stride_bytes;
+        float *o = out + r * out_stride;
+        for (uint32_t c = 0; c < n; c++) {
+            o[c] = (w00 * (float)p[c] + w01 * (float)p[c + 1u]) + (w10 * (float)q[c] + w11 * (float)q[c + 1u]);
+        }
+    }
+    return true;
+}
+
 /* 1 2 1 down and across: n + 2 rows and columns become n. out may be in. */
 static void window_smooth(const float *in, uint32_t in_stride, uint32_t n, float *out, uint32_t out_stride)
 {
@@ -169,10 +188,13 @@ static float window_normalise(float *v, uint32_t n)
 
 bool oc_ground_patch_take(const oc_image_t *grey, const double at[2], uint32_t n, bool is_smooth, ground_patch_t *patch)
 {
-    static const double same[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     float scratch[GROUND_MAX_WIDE_PX * GROUND_WIDE_STRIDE];
     patch->n = n;
-    if (!window_take(grey, same, at, n, is_smooth, scratch, patch->v, GROUND_PATCH_STRIDE)) return false;
+    if (!window_copy(grey, at, is_smooth ? n + 2u : n, is_smooth ? scratch : patch->v,
+                     is_smooth ? GROUND_WIDE_STRIDE : GROUND_PATCH_STRIDE)) {
+        return false;
+    }
+    if (is_smooth) window_smooth(scratch, GROUND_WIDE_STRIDE, n, patch->v, GROUND_PATCH_STRIDE);
     patch->sd = window_normalise(patch->v, n);
     return patch->sd >= MIN_SD;
 }
