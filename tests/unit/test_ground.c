@@ -10,6 +10,7 @@ typedef struct tally {
     int n_true_ground, n_found;   /* truly ground and seen twice; of these labelled so */
     int n_high, n_high_lost;      /* on a box above 20 mm; of these labelled ground */
     int n_high_obstacle;
+    int n_foot, n_foot_lost; /* at the foot of a box, which touches the ground; of these labelled ground */
 } tally_t;
 
 /* Is the ground point at a pixel of one view seen, as ground, by a view it is compared with? */
@@ -37,8 +38,12 @@ static void tally_add(tally_t *t, int view)
         t->n_found += truth == OC_LABEL_GROUND && is_twice && label == OC_LABEL_GROUND;
         t->n_ground += label == OC_LABEL_GROUND;
         t->n_ground_right += label == OC_LABEL_GROUND && truth == OC_LABEL_GROUND;
-        if (truth != OC_LABEL_OBSTACLE || oc_scene_height_m(&scene, &cameras[view], &junctions[view][i]) < 0.02)
+        if (truth != OC_LABEL_OBSTACLE) continue;
+        if (oc_scene_height_m(&scene, &cameras[view], &junctions[view][i]) < 0.02) {
+            t->n_foot++;
+            t->n_foot_lost += label == OC_LABEL_GROUND;
             continue;
+        }
         t->n_high++;
         t->n_high_lost += label == OC_LABEL_GROUND;
         t->n_high_obstacle += label == OC_LABEL_OBSTACLE;
@@ -66,14 +71,16 @@ static tally_t run_all_pairs(double margin_m, double margin_rad, bool is_perturb
 
 static void check_tally(const tally_t *t, const char *what)
 {
-    char text[160];
-    snprintf(text, sizeof text, "%s: ground %d right of %d, found %d of %d, box %d lost, %d found of %d", what,
+    char text[200];
+    snprintf(text, sizeof text,
+             "%s: ground %d right of %d, found %d of %d, box %d lost, %d found of %d, foot %d lost of %d", what,
              t->n_ground_right, t->n_ground, t->n_found, t->n_true_ground, t->n_high_lost, t->n_high_obstacle,
-             t->n_high);
+             t->n_high, t->n_foot_lost, t->n_foot);
     TEST_ASSERT_MESSAGE(t->n_true_ground > 200 && t->n_high > 100, text);
     TEST_ASSERT_MESSAGE(t->n_ground_right >= 0.98 * t->n_ground, text);
     TEST_ASSERT_MESSAGE(t->n_found >= 0.9 * t->n_true_ground, text);
     TEST_ASSERT_MESSAGE(t->n_high_lost <= 0.02 * t->n_high, text);
+    TEST_ASSERT_MESSAGE(t->n_foot > 20 && t->n_foot_lost <= 0.05 * t->n_foot, text);
     TEST_ASSERT_MESSAGE(t->n_high_obstacle >= 0.5 * t->n_high, text);
 }
 
