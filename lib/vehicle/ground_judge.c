@@ -20,6 +20,9 @@
 /* A junction stays at least this far inside a window that was moved away from a border. */
 #define MIN_INSIDE_PX 2.0
 
+/* Windows are moved to this much more than they need from a border, for a step is only nearly right. */
+#define BORDER_SLACK_PX 0.9
+
 /* Error of a shift between two pictures beyond what their noise explains, px:
  * resampling, and windows that are not quite flat. */
 #define SHIFT_FLOOR_PX 0.1
@@ -77,7 +80,7 @@ static bool window_place(const sight_t *s, uint32_t n_px, const double at[2], do
         mid[1] = clamp(mid[1], half + 1.0, max_y);
         if (!(fabs(mid[0] - at[0]) <= reach && fabs(mid[1] - at[1]) <= reach)) return false;
         if (!window_overshoot(s, mid, half + GROUND_SEARCH_PX, over)) return false;
-        if (over[0] == 0.0 && over[1] == 0.0) return true;
+        if (fabs(over[0]) <= BORDER_SLACK_PX && fabs(over[1]) <= BORDER_SLACK_PX) return true;
         if (oc_homography_jacobian(s->H, mid[0], mid[1], J) != OC_OK) return false;
         const double det = J[0] * J[3] - J[1] * J[2];
         if (!(fabs(det) > 1e-6)) return false;

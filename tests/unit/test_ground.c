@@ -181,6 +181,60 @@ static void votes_are_a_sum_without_order(void)
     TEST_ASSERT_TRUE(oc_ground_evidence(&many) < before);
 }
 
+static double border_distance_px(double x, double y)
+{
+    return fmin(fmin(x, WIDTH - 1.0 - x), fmin(y, HEIGHT - 1.0 - y));
+}
+
+/* Places of the ground that one picture shows so near its border that a window round them does not fit in: the window
+ * is moved. `is_own`: near the border of the view itself, not of the reference. */
+static void check_border(bool is_own)
+{
+    static oc_junction_t places[OC_MAX_JUNCTIONS];
+    oc_ground_view_t left = view_of(2, 0.01, OC_TEST_RAD(1.0));
+    const oc_ground_view_t right = view_of(1, 0.01, OC_TEST_RAD(1.0));
+    double H[9], p[3];
+    uint32_t n = n_junctions[2] < 400 ? n_junctions[2] : 400; /* what the pair is fitted to */
+    const uint32_t first = n;
+    memcpy(places, junctions[2], sizeof places);
+    TEST_ASSERT_EQUAL(OC_OK, oc_plane_ground_homography(&cameras[2], &cameras[1], H));
+    for (double y = 3; y < HEIGHT - 3; y += 5) {
+        for (double x = 3; x < WIDTH - 3; x += 5) {
+            double u, v;
+            if (n == OC_MAX_JUNCTIONS || !(oc_homography_apply(H, x, y, &u, &v) > 0.0)) continue;
+            const double own = border_distance_px(x, y), other = border_distance_px(u, v);
+            /* In the reference the search needs 3 px more. */
+            const double near = is_own ? own : other - 4.0, far = is_own ? other : own;
+            if (!(near > 3.0 && near < 8.0 && far > 25.0)) continue;
+            if (oc_scene_hit(&scene, &cameras[2], x, y, p) != OC_SCENE_FACE_GROUND) continue;
+            if (oc_scene_hit(&scene, &cameras[1], u, v, p) != OC_SCENE_FACE_GROUND) continue;
+            places[n].x_px = (float)x;
+            places[n++].y_px = (float)y;
+        }
+    }
+    left.junctions = places;
+    left.n_junctions = n;
+    oc_ground_result_t result;
+    memset(votes, 0, sizeof votes);
+    TEST_ASSERT_EQUAL(OC_OK, oc_ground_match_views(&ws, &params, &left, &right, votes[2], votes[1], &result));
+    int n_found = 0;
+    for (uint32_t i = first; i < n; i++) {
+        uint8_t label, confidence;
+        oc_ground_decide(&params, &votes[2][i], &label, &confidence);
+        n_found += label == OC_LABEL_GROUND;
+    }
+    char text[80];
+    snprintf(text, sizeof text, "%s border: %d of %u", is_own ? "own" : "other", n_found, n - first);
+    TEST_ASSERT_MESSAGE(n - first > 30, text);
+    TEST_ASSERT_MESSAGE(n_found >= 0.7 * (n - first), text);
+}
+
+static void ground_near_a_border_is_found(void)
+{
+    check_border(true);
+    check_border(false);
+}
+
 /* ---- the homography ---- */
 
 /* Mean error of the refined transfer over the ground that both views see. */
@@ -311,6 +365,7 @@ int main(void)
     RUN_TEST(ground_is_told_from_boxes_with_exact_poses);
     RUN_TEST(ground_is_told_from_boxes_without_margins);
     RUN_TEST(ground_is_told_from_boxes_with_wrong_poses);
+    RUN_TEST(ground_near_a_border_is_found);
     RUN_TEST(votes_weigh_by_their_evidence);
     RUN_TEST(confidence_is_the_probability_of_the_evidence);
     RUN_TEST(votes_are_a_sum_without_order);
