@@ -2,6 +2,7 @@
 // outcrop-bench-ground: the ground filter against truth, the thesis' table 4.1, and the clock.
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 
@@ -13,6 +14,13 @@
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+// The folder's own name: figures travel, paths do not.
+std::string name_of(const std::string &site)
+{
+    const std::filesystem::path path = std::filesystem::path(site) / "";
+    return path.parent_path().filename().string();
+}
 
 void write_json(const std::string &file, const Json &json)
 {
@@ -72,17 +80,17 @@ int main(int argc, char **argv)
             for (const std::string &site : sites) {
                 std::printf("%s\n", site.c_str());
                 options.site = site;
-                out[site] = outcrop::bench::measure_labels(options);
+                out[name_of(site)] = outcrop::bench::measure_labels(options);
             }
         }
         if (speed->parsed()) {
             for (const std::string &site : sites) {
                 std::printf("%s\n", site.c_str());
                 speed_options.site = site;
-                out[site] = outcrop::bench::measure_speed(speed_options);
+                out[name_of(site)] = outcrop::bench::measure_speed(speed_options);
             }
         }
-        if (table->parsed()) out = outcrop::bench::measure_table(table_options);
+        if (table->parsed()) out[name_of(table_options.site)] = outcrop::bench::measure_table(table_options);
         write_json(json_file, out);
     } catch (const std::exception &e) {
         std::cerr << "outcrop-bench-ground: " << e.what() << '\n';
