@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause
- * The refined ground homography of a pair: RANSAC for the matches, then both
- * poses moved inside their margins.
+ * The refined ground homography of a pair: both poses moved inside their margins.
  *
  * A free homography fitted to matches in one corner of the image is wild in the
- * others. Here RANSAC only picks the matches; what is kept is the homography of
+ * others. RANSAC only picks the matches; what is kept is the homography of
  * two cameras that stay where their margins allow, so that it extrapolates as well
  * as the poses do, and its covariance says where it is good. */
 #include <math.h>
@@ -14,78 +13,12 @@
 #include "core/plane.h"
 #include "vehicle/ground_internal.h"
 
-/* Sum of squared moves, in standard deviations, when all twelve parameters
- * are off by their whole margin: 12 * 3. */
-#define MAX_PRIOR_CHI2 36.0
+/* Sum of squared moves, in standard deviations. Twelve uniform errors exceed it
+ * once in 50 000 pairs, and the fit shrinks what they were. */
+#define MAX_PRIOR_CHI2 25.0
 
 /* Rounds of relinearisation; the third changes nothing visible. */
 #define FIT_ROUNDS 4
-
-/* ---- fixed pseudo-random numbers ---- */
-
-static uint32_t random_next(uint32_t *state)
-{
-    uint32_t s = *state;
-    s ^= s << 13;
-    s ^= s >> 17;
-    s ^= s << 5;
-    *state = s;
-    return s;
-}
-
-static uint32_t random_seed(uint16_t a, uint16_t b)
-{
-    uint32_t s = ((uint32_t)a << 16 | b) * 2654435761u ^ 0x9e3779b9u;
-    if (s == 0) s = 1;
-    for (int i = 0; i < 4; i++) (void)random_next(&s);
-    return s;
-}
-
-/* ---- four points ---- */
-
-/* The eight unknowns of H (h33 = 1) by elimination with pivots. */
-static bool solve_8(double a[8][9], double x[8])
-{
-    for (int c = 0; c < 8; c++) {
-        int best = c;
-        for (int r = c + 1; r < 8; r++) {
-            if (fabs(a[r][c]) > fabs(a[best][c])) best = r;
-        }
-        if (!(fabs(a[best][c]) > 1e-9)) return false;
-        for (int k = c; k < 9; k++) {
-            const double swap = a[c][k];
-            a[c][k] = a[best][k];
-            a[best][k] = swap;
-        }
-        for (int r = 0; r < 8; r++) {
-            if (r == c) continue;
-            const double f = a[r][c] / a[c][c];
-            for (int k = c; k < 9; k++) a[r][k] -= f * a[c][k];
-        }
-    }
-    for (int r = 0; r < 8; r++) x[r] = a[r][8] / a[r][r];
-    return true;
-}
-
-/* Positions of a match, left and right, about the middle of all and in units
- * of the image width: keeps the equations well conditioned. */
-typedef struct scaled_match {
-    double x, y, x2, y2;
-} scaled_match_t;
-
-static bool four_points(const scaled_match_t m[4], double H[9])
-{
-    double a[8][9];
-    for (int i = 0; i < 4; i++) {
-        const double top[9] = {m[i].x, m[i].y, 1, 0, 0, 0, -m[i].x2 * m[i].x, -m[i].x2 * m[i].y, m[i].x2};
-        const double low[9] = {0, 0, 0, m[i].x, m[i].y, 1, -m[i].y2 * m[i].x, -m[i].y2 * m[i].y, m[i].y2};
-        memcpy(a[2 * i], top, sizeof top);
-        memcpy(a[2 * i + 1], low, sizeof low);
-    }
-    if (!solve_8(a, H)) return false;
-    H[8] = 1.0;
-    return true;
-}
 
 /* ---- counting ---- */
 
@@ -96,24 +29,15 @@ static double transfer_error(const double H[9], double x, double y, double x2, d
     return hypot(u - x2, v - y2);
 }
 
-static const oc_junction_t *left_of(const oc_ground_view_t *view, const oc_ground_match_t *m)
-{
-    return &view->junctions[m->left];
-}
-
-/* Marks the matches whose transfer error is within t both ways. */
-static uint32_t mark_inliers(oc_ground_ws_t *ws, const oc_ground_view_t *view, const oc_ground_view_t *ref,
-                             const ground_pair_t *pair, double t_px, double *rms_px)
+/* Marks the pins whose transfer error is within t both ways. */
+static uint32_t mark_inliers(oc_ground_ws_t *ws, const ground_pair_t *pair, double t_px, double *rms_px)
 {
     uint32_t n = 0;
     double sum = 0.0;
-    for (uint32_t i = 0; i < ws->n_matches; i++) {
-        const oc_junction_t *a = left_of(view, &ws->matches[i]);
-        const oc_junction_t *b = &ref->junctions[ws->matches[i].right];
-        const double there =
-            transfer_error(pair->H, (double)a->x_px, (double)a->y_px, (double)b->x_px, (double)b->y_px);
-        const double back =
-            transfer_error(pair->H_inv, (double)b->x_px, (double)b->y_px, (double)a->x_px, (double)a->y_px);
+    for (uint32_t i = 0; i < ws->n_pins; i++) {
+        const oc_ground_pin_t *p = &ws->pins[i];
+        const double x = (double)p->x_px, y = (double)p->y_px, x2 = (double)p->x2_px, y2 = (double)p->y2_px;
+        const double there = transfer_error(pair->H, x, y, x2, y2), back = transfer_error(pair->H_inv, x2, y2, x, y);
         ws->is_inlier[i] = there <= t_px && back <= t_px;
         if (!ws->is_inlier[i]) continue;
         n++;
@@ -229,25 +153,21 @@ static bool invert_spd(double a[GROUND_PARAMS][GROUND_PARAMS], double inv[GROUND
 
 /* Normal equations of the inliers' transfer errors (Cauchy weights) and of the
  * prior u ~ N(0, 1). */
-static void fit_accumulate(const oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
-                           const oc_ground_view_t *ref, const ground_pair_t *pair,
-                           double A[GROUND_PARAMS][GROUND_PARAMS], double b[GROUND_PARAMS])
+static void fit_accumulate(const oc_ground_ws_t *ws, const ground_pair_t *pair, double A[GROUND_PARAMS][GROUND_PARAMS],
+                           double b[GROUND_PARAMS])
 {
     memset(A, 0, sizeof(double[GROUND_PARAMS][GROUND_PARAMS]));
     for (int k = 0; k < GROUND_PARAMS; k++) {
         A[k][k] = 1.0;
         b[k] = -pair->u[k];
     }
-    for (uint32_t i = 0; i < ws->n_matches; i++) {
+    for (uint32_t i = 0; i < ws->n_pins; i++) {
         if (!ws->is_inlier[i]) continue;
-        const oc_junction_t *l = left_of(view, &ws->matches[i]);
-        const oc_junction_t *r = &ref->junctions[ws->matches[i].right];
-        double to[2], J[GROUND_PARAMS][2], D[4];
-        if (!transfer_jacobian(pair, (double)l->x_px, (double)l->y_px, to, J)) continue;
-        if (oc_homography_jacobian(pair->H, (double)l->x_px, (double)l->y_px, D) != OC_OK) continue;
-        /* The left junction's error arrives magnified by D; its area stands for both axes. */
-        const double variance = params->sigma_px * params->sigma_px * (1.0 + fabs(D[0] * D[3] - D[1] * D[2]));
-        const double ex = (double)r->x_px - to[0], ey = (double)r->y_px - to[1];
+        const oc_ground_pin_t *pin = &ws->pins[i];
+        double to[2], J[GROUND_PARAMS][2];
+        if (!transfer_jacobian(pair, (double)pin->x_px, (double)pin->y_px, to, J)) continue;
+        const double variance = (double)pin->variance_px2;
+        const double ex = (double)pin->x2_px - to[0], ey = (double)pin->y2_px - to[1];
         const double weight = 1.0 / (variance * (1.0 + (ex * ex + ey * ey) / (4.0 * variance)));
         for (int p = 0; p < GROUND_PARAMS; p++) {
             b[p] += weight * (J[p][0] * ex + J[p][1] * ey);
@@ -260,13 +180,13 @@ static void fit_accumulate(const oc_ground_ws_t *ws, const oc_ground_params_t *p
 }
 
 /* Refit the pair to the marked inliers, from the poses as given. */
-static bool pair_fit(ground_pair_t *pair, const oc_ground_ws_t *ws, const oc_ground_params_t *params,
-                     const oc_ground_view_t *view, const oc_ground_view_t *ref)
+static bool pair_fit(ground_pair_t *pair, const oc_ground_ws_t *ws, const oc_ground_view_t *view,
+                     const oc_ground_view_t *ref)
 {
     for (int round = 0; round < FIT_ROUNDS; round++) {
         double A[GROUND_PARAMS][GROUND_PARAMS], b[GROUND_PARAMS];
         if (!pair_linearise(pair, view, ref)) return false;
-        fit_accumulate(ws, params, view, ref, pair, A, b);
+        fit_accumulate(ws, pair, A, b);
         if (!invert_spd(A, pair->cov)) return false;
         for (int p = 0; p < GROUND_PARAMS; p++) {
             double step = 0.0;
@@ -285,113 +205,9 @@ static double prior_chi2(const ground_pair_t *pair)
     return sum;
 }
 
-/* ---- sampling ---- */
-
-typedef struct ransac_frame {
-    double middle[4]; /* x, y, x2, y2 */
-    double scale;
-} ransac_frame_t;
-
-static void ransac_scale(oc_ground_ws_t *ws, const oc_ground_view_t *view, const oc_ground_view_t *ref,
-                         ransac_frame_t *frame)
-{
-    const double n = ws->n_matches;
-    memset(frame->middle, 0, sizeof frame->middle);
-    for (uint32_t i = 0; i < ws->n_matches; i++) {
-        const oc_junction_t *l = left_of(view, &ws->matches[i]);
-        const oc_junction_t *r = &ref->junctions[ws->matches[i].right];
-        const double v[4] = {(double)l->x_px, (double)l->y_px, (double)r->x_px, (double)r->y_px};
-        for (int k = 0; k < 4; k++) frame->middle[k] += v[k] / n;
-    }
-    frame->scale = 1.0 / view->grey.width_px;
-    for (uint32_t i = 0; i < ws->n_matches; i++) {
-        const oc_junction_t *l = left_of(view, &ws->matches[i]);
-        const oc_junction_t *r = &ref->junctions[ws->matches[i].right];
-        const double v[4] = {(double)l->x_px, (double)l->y_px, (double)r->x_px, (double)r->y_px};
-        for (int k = 0; k < 4; k++)
-            ws->design[4u * i + (uint32_t)k] = (float)((v[k] - frame->middle[k]) * frame->scale);
-    }
-}
-
-/* Four different matches, no three of the left points near a line. */
-static bool ransac_sample(const oc_ground_ws_t *ws, uint32_t *state, scaled_match_t sample[4])
-{
-    uint32_t index[4];
-    for (uint32_t k = 0; k < 4; k++) {
-        index[k] = random_next(state) % ws->n_matches;
-        for (uint32_t j = 0; j < k; j++) {
-            if (index[j] == index[k]) return false;
-        }
-        const float *d = &ws->design[4 * index[k]];
-        sample[k] = (scaled_match_t){(double)d[0], (double)d[1], (double)d[2], (double)d[3]};
-    }
-    for (int skip = 0; skip < 4; skip++) {
-        const scaled_match_t *a = &sample[(skip + 1) % 4], *b = &sample[(skip + 2) % 4], *c = &sample[(skip + 3) % 4];
-        const double area = (b->x - a->x) * (c->y - a->y) - (c->x - a->x) * (b->y - a->y);
-        if (fabs(area) < 1e-3) return false;
-    }
-    return true;
-}
-
-/* Matches that a homography in scaled coordinates explains both ways. */
-static uint32_t ransac_count(const oc_ground_ws_t *ws, const double H[9], double t)
-{
-    double inverse[9];
-    if (oc_mat3_inverse(H, inverse) != OC_OK) return 0;
-    uint32_t n = 0;
-    for (uint32_t i = 0; i < ws->n_matches; i++) {
-        const float *d = &ws->design[4 * i];
-        n += transfer_error(H, (double)d[0], (double)d[1], (double)d[2], (double)d[3]) <= t &&
-             transfer_error(inverse, (double)d[2], (double)d[3], (double)d[0], (double)d[1]) <= t;
-    }
-    return n;
-}
-
-/* Rounds after which a better sample is unlikely (1 %) to have been missed. */
-static uint32_t ransac_enough(uint32_t n_inliers, uint32_t n, uint32_t limit)
-{
-    const double share = (double)n_inliers / n;
-    const double good = share * share * share * share;
-    if (good > 0.999) return 1;
-    if (good < 1e-6) return limit;
-    const double rounds = ceil(log(0.01) / log(1.0 - good));
-    return rounds < (double)limit ? (uint32_t)rounds : limit;
-}
-
-/* Best homography from four matches, scaled coordinates. Returns its inliers. */
-static uint32_t ransac_run(const oc_ground_ws_t *ws, const oc_ground_params_t *params, uint32_t seed, double t,
-                           double best_H[9])
-{
-    uint32_t state = seed, best = 0, limit = params->ransac_rounds;
-    for (uint32_t round = 0; round < limit; round++) {
-        scaled_match_t sample[4];
-        double H[9];
-        if (!ransac_sample(ws, &state, sample) || !four_points(sample, H)) continue;
-        const uint32_t n = ransac_count(ws, H, t);
-        if (n <= best) continue;
-        best = n;
-        memcpy(best_H, H, 9 * sizeof *H);
-        limit = ransac_enough(n, ws->n_matches, params->ransac_rounds);
-        if (limit < round + 1) limit = round + 1;
-    }
-    return best;
-}
-
-static void ransac_mark(oc_ground_ws_t *ws, const double H[9], double t)
-{
-    double inverse[9];
-    const bool has_inverse = oc_mat3_inverse(H, inverse) == OC_OK;
-    for (uint32_t i = 0; i < ws->n_matches; i++) {
-        const float *d = &ws->design[4 * i];
-        ws->is_inlier[i] = has_inverse &&
-                           transfer_error(H, (double)d[0], (double)d[1], (double)d[2], (double)d[3]) <= t &&
-                           transfer_error(inverse, (double)d[2], (double)d[3], (double)d[0], (double)d[1]) <= t;
-    }
-}
-
 /* ---- all of it ---- */
 
-/* Fit to the marked matches, mark anew, fit again, and hold the result against
+/* Fit to the marked pins, mark anew, fit again, and hold the result against
  * the margins. */
 static bool settle(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
                    const oc_ground_view_t *reference, ground_pair_t *pair, oc_ground_result_t *result)
@@ -399,8 +215,8 @@ static bool settle(oc_ground_ws_t *ws, const oc_ground_params_t *params, const o
     uint32_t n = 0;
     double rms_px = 0.0;
     for (int pass = 0; pass < 2; pass++) {
-        if (!pair_fit(pair, ws, params, view, reference)) return false;
-        n = mark_inliers(ws, view, reference, pair, (double)params->t_transfer_px, &rms_px);
+        if (!pair_fit(pair, ws, view, reference)) return false;
+        n = mark_inliers(ws, pair, (double)params->t_transfer_px, &rms_px);
         if (n < params->min_inliers) return false;
     }
     /* The poses' own margins are the check on what RANSAC has found: a plane
@@ -414,54 +230,41 @@ static bool settle(oc_ground_ws_t *ws, const oc_ground_params_t *params, const o
     return true;
 }
 
-void oc_ground_refine(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
-                      const oc_ground_view_t *reference, ground_pair_t *pair, oc_ground_result_t *result)
+bool oc_ground_fit(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
+                   const oc_ground_view_t *reference, ground_pair_t *pair, oc_ground_result_t *result)
 {
-    if (ws->n_matches < params->min_inliers || ws->n_matches < 4) return;
-
-    ransac_frame_t frame;
-    ransac_scale(ws, view, reference, &frame);
-    double H[9];
-    /* Four noisy points miss others by more than a fit does: half as much again. */
-    const double t = 1.5 * (double)params->t_transfer_px * frame.scale;
-    const uint32_t found = ransac_run(ws, params, random_seed(view->view, reference->view), t, H);
-    if (found < params->min_inliers) return;
-    ransac_mark(ws, H, t);
-
+    if (oc_ground_ransac(ws, params, view, reference) < params->min_inliers) return false;
     memset(pair, 0, sizeof *pair);
-    result->is_refined = settle(ws, params, view, reference, pair, result);
+    return settle(ws, params, view, reference, pair, result);
 }
 
 bool oc_ground_refit(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
                      const oc_ground_view_t *reference, ground_pair_t *pair, oc_ground_result_t *result)
 {
     double rms_px;
-    if (mark_inliers(ws, view, reference, pair, (double)params->t_transfer_px, &rms_px) < params->min_inliers) {
-        return false;
-    }
+    if (mark_inliers(ws, pair, (double)params->t_transfer_px, &rms_px) < params->min_inliers) return false;
     ground_pair_t again = *pair;
     if (!settle(ws, params, view, reference, &again, result)) return false;
     *pair = again;
     return true;
 }
 
-double oc_ground_transfer_sigma_px(const ground_pair_t *pair, double x_px, double y_px)
+bool oc_ground_transfer_covariance(const ground_pair_t *pair, double x_px, double y_px, double cov_px2[3])
 {
     double to[2], J[GROUND_PARAMS][2];
-    if (!transfer_jacobian(pair, x_px, y_px, to, J)) return (double)INFINITY;
-    double xx = 0.0, xy = 0.0, yy = 0.0;
+    if (!transfer_jacobian(pair, x_px, y_px, to, J)) return false;
+    cov_px2[0] = cov_px2[1] = cov_px2[2] = 0.0;
     for (int p = 0; p < GROUND_PARAMS; p++) {
         double sx = 0.0, sy = 0.0;
         for (int q = 0; q < GROUND_PARAMS; q++) {
             sx += pair->cov[p][q] * J[q][0];
             sy += pair->cov[p][q] * J[q][1];
         }
-        xx += J[p][0] * sx;
-        xy += J[p][0] * sy;
-        yy += J[p][1] * sy;
+        cov_px2[0] += J[p][0] * sx;
+        cov_px2[1] += J[p][0] * sy;
+        cov_px2[2] += J[p][1] * sy;
     }
-    const double half = 0.5 * (xx + yy);
-    return sqrt(half + sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy));
+    return true;
 }
 
 oc_status_t oc_ground_rise(const ground_pair_t *pair, double x_px, double y_px, double z_m, double rise_px[2])

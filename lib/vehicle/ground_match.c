@@ -11,11 +11,14 @@
 /* Pairs correlated in one pass; keeps the time of absurdly wide margins bounded. */
 #define MAX_CANDIDATES 60000u
 
-/* A pair that cannot tell this many times t_h from the ground does not judge. */
-#define MAX_BLIND_HEIGHT 5.0
+/* Times that the pair is fitted to what was found; the second reaches what the first brought into reach. */
+#define REGISTER_ROUNDS 2
 
-/* Areas that differ by more are not the same texture any more. */
-#define MAX_AREA_RATIO 9.0
+/* Ground that correlates less on average is not just resampled: blur, noise, a codec. */
+#define CLEAN_NCC 0.97
+
+/* What the smoothing leaves of white noise. */
+#define SMOOTH_NOISE 0.375
 
 #define NO_MATCH UINT16_MAX
 
@@ -25,33 +28,30 @@
 typedef struct pairing {
     const oc_ground_view_t *left, *right;
     const double *H, *H_inv;
-    const oc_pair_t *window; /* NULL: within radius_px of the transfer */
-    double radius_px;
-    double chi2;
+    const oc_pair_t *prior;       /* windows of the margins, or NULL: */
+    const ground_pair_t *refined; /* of what the fit has left of them */
+    double sigma_px, chi2;
     float t_ncc;
 } pairing_t;
 
-typedef struct gate {
-    oc_window_t window;
-    bool has_window;
-    double to[2], radius2;
-    double chi2;
-} gate_t;
-
-static bool gate_open(const pairing_t *how, const double at[2], gate_t *gate)
+static bool window_open(const pairing_t *how, const double at[2], oc_window_t *window)
 {
-    gate->has_window = how->window != NULL;
-    gate->chi2 = how->chi2;
-    gate->radius2 = how->radius_px * how->radius_px;
-    if (gate->has_window) return oc_window_ground(how->window, at[0], at[1], &gate->window) == OC_OK;
-    return oc_homography_apply(how->H, at[0], at[1], &gate->to[0], &gate->to[1]) > 0.0;
-}
-
-static bool gate_passes(const gate_t *gate, const double to[2])
-{
-    if (gate->has_window) return oc_window_d2(&gate->window, to[0], to[1]) < gate->chi2;
-    const double dx = to[0] - gate->to[0], dy = to[1] - gate->to[1];
-    return dx * dx + dy * dy < gate->radius2;
+    if (how->prior) return oc_window_ground(how->prior, at[0], at[1], window) == OC_OK;
+    double J[4];
+    double *cov = window->cov_px2;
+    if (!(oc_homography_apply(how->H, at[0], at[1], &window->x_px, &window->y_px) > 0.0)) return false;
+    if (oc_homography_jacobian(how->H, at[0], at[1], J) != OC_OK) return false;
+    if (!oc_ground_transfer_covariance(how->refined, at[0], at[1], cov)) return false;
+    const double noise2 = how->sigma_px * how->sigma_px;
+    cov[0] += noise2 * (1.0 + J[0] * J[0] + J[1] * J[1]);
+    cov[1] += noise2 * (J[0] * J[2] + J[1] * J[3]);
+    cov[2] += noise2 * (1.0 + J[2] * J[2] + J[3] * J[3]);
+    const double det = cov[0] * cov[2] - cov[1] * cov[1];
+    if (!(det > 0.0)) return false;
+    window->info[0] = cov[2] / det;
+    window->info[1] = -cov[1] / det;
+    window->info[2] = cov[0] / det;
+    return true;
 }
 
 static void pair_score(oc_ground_ws_t *ws, uint32_t i, uint32_t j, float score)
@@ -71,20 +71,20 @@ static uint32_t pair_one(oc_ground_ws_t *ws, const pairing_t *how, uint32_t n_px
 {
     const oc_junction_t *a = &how->left->junctions[i];
     const double at[2] = {(double)a->x_px, (double)a->y_px};
-    gate_t gate;
+    oc_window_t window;
     ground_patch_t patch, back_patch;
-    if (!gate_open(how, at, &gate)) return 0;
-    if (!oc_ground_patch_take(&how->left->grey, at[0], at[1], n_px, &patch)) return 0;
+    if (!window_open(how, at, &window)) return 0;
+    if (!oc_ground_patch_take(&how->left->grey, at, n_px, false, &patch)) return 0;
 
     uint32_t n_candidates = 0;
     for (uint32_t j = 0; j < how->right->n_junctions; j++) {
         const oc_junction_t *b = &how->right->junctions[j];
         const double to[2] = {(double)b->x_px, (double)b->y_px};
-        if (!gate_passes(&gate, to)) continue;
+        if (!(oc_window_d2(&window, to[0], to[1]) < how->chi2)) continue;
         n_candidates++;
         const float there = oc_ground_correlate(&patch, at, &how->right->grey, how->H, to);
         if (there < how->t_ncc) continue;
-        if (!oc_ground_patch_take(&how->right->grey, to[0], to[1], n_px, &back_patch)) continue;
+        if (!oc_ground_patch_take(&how->right->grey, to, n_px, false, &back_patch)) continue;
         const float back = oc_ground_correlate(&back_patch, to, &how->left->grey, how->H_inv, at);
         if (back < how->t_ncc) continue;
         pair_score(ws, i, j, back < there ? back : there);
@@ -116,104 +116,90 @@ static uint32_t pair_up(oc_ground_ws_t *ws, const oc_ground_params_t *params, co
     return n_candidates;
 }
 
-/* ---- judging single junctions ---- */
+/* ---- votes ---- */
 
-typedef enum verdict { VERDICT_NONE, VERDICT_GROUND, VERDICT_REFUTED } verdict_t;
-
-/* One direction of a refined pair. */
-typedef struct sight {
-    const oc_ground_view_t *from, *to;
-    const ground_pair_t *pair; /* from -> to */
-    const double *H, *H_inv;
-    bool is_reverse; /* pair's own left is `to` */
-} sight_t;
-
-/* Standard deviation of the expected place, pixels of `to`. */
-static double place_sigma_px(const sight_t *s, const ground_pair_t *forward, const double at[2], const double to[2],
-                             double area)
-{
-    if (!s->is_reverse) return oc_ground_transfer_sigma_px(forward, at[0], at[1]);
-    return oc_ground_transfer_sigma_px(forward, to[0], to[1]) * sqrt(area);
-}
-
-static bool agrees_back(const sight_t *s, const oc_ground_params_t *params, const double at[2],
-                        const ground_lookup_t *found)
-{
-    double to[2];
-    ground_patch_t patch;
-    if (oc_homography_apply(s->H, at[0] + (double)found->dx_px, at[1] + (double)found->dy_px, &to[0], &to[1]) == 0.0) {
-        return false;
-    }
-    if (!oc_ground_patch_take(&s->to->grey, to[0], to[1], params->window_px, &patch)) return false;
-    return oc_ground_correlate(&patch, to, &s->from->grey, s->H_inv, at) >= params->t_g_second;
-}
-
-/* The place where the patch was found, off_px from where the ground would be,
- * means a height: near enough to 0, and known well enough to mean it? */
-static bool is_at_height_0(const sight_t *s, const oc_ground_params_t *params, const double at[2],
-                           const double off_px[2], double sigma_px)
-{
-    double rise_px[2]; /* for a height of t_h */
-    if (!(hypot(off_px[0], off_px[1]) <= (double)params->t_transfer_px)) return false;
-    if (oc_ground_rise(s->pair, at[0], at[1], params->t_h_m, rise_px) != OC_OK) return false;
-    const double rise2 = rise_px[0] * rise_px[0] + rise_px[1] * rise_px[1];
-    if (!(rise2 > 0.0)) return false;
-    const double height = (off_px[0] * rise_px[0] + off_px[1] * rise_px[1]) / rise2; /* in units of t_h */
-    const double doubt = 2.58 * hypot(sigma_px, params->sigma_px) / sqrt(rise2);
-    return doubt <= MAX_BLIND_HEIGHT && (fabs(height) <= 1.0 || fabs(height) <= doubt);
-}
-
-static verdict_t judge(const sight_t *s, const ground_pair_t *forward, const oc_ground_params_t *params,
-                       const oc_junction_t *junction, uint8_t *strength)
-{
-    const double at[2] = {(double)junction->x_px, (double)junction->y_px};
-    double to[2], J[4];
-    if (!(oc_homography_apply(s->H, at[0], at[1], &to[0], &to[1]) > 0.0)) return VERDICT_NONE;
-    if (oc_homography_jacobian(s->H, at[0], at[1], J) != OC_OK) return VERDICT_NONE;
-    const double area = J[0] * J[3] - J[1] * J[2];
-    if (!(area < MAX_AREA_RATIO && area > 1.0 / MAX_AREA_RATIO)) return VERDICT_NONE;
-    const double sigma_px = place_sigma_px(s, forward, at, to, area);
-    if (!(2.58 * sigma_px <= (double)params->t_transfer_px)) return VERDICT_NONE;
-
-    ground_patch_t patch;
-    ground_lookup_t found;
-    if (!oc_ground_patch_take(&s->from->grey, at[0], at[1], params->window_px, &patch)) return VERDICT_NONE;
-    oc_ground_look_up(&patch, at, &s->to->grey, s->H, &found);
-    if (!found.is_inside) return VERDICT_NONE;
-    if (found.ncc < params->t_refuted) {
-        const float lack = params->t_refuted - (found.ncc > 0.0f ? found.ncc : 0.0f);
-        *strength = (uint8_t)(128.0f + 127.0f * lack / (params->t_refuted + 1e-6f));
-        return VERDICT_REFUTED;
-    }
-    if (found.ncc < params->t_g_second) return VERDICT_NONE;
-
-    const double off_px[2] = {J[0] * (double)found.dx_px + J[1] * (double)found.dy_px,
-                              J[2] * (double)found.dx_px + J[3] * (double)found.dy_px};
-    if (!is_at_height_0(s, params, at, off_px, sigma_px)) return VERDICT_NONE;
-    if (!agrees_back(s, params, at, &found)) return VERDICT_NONE;
-    *strength = (uint8_t)(255.0f * (found.ncc < 1.0f ? found.ncc : 1.0f));
-    return VERDICT_GROUND;
-}
-
-static void vote(oc_ground_votes_t *votes, verdict_t verdict, uint8_t strength)
-{
-    if (verdict == VERDICT_GROUND) {
-        if (votes->n_ground < UINT8_MAX) votes->n_ground++;
-        if (strength > votes->best_ground) votes->best_ground = strength;
-    } else if (verdict == VERDICT_REFUTED) {
-        if (votes->n_refuted < UINT8_MAX) votes->n_refuted++;
-        if (strength > votes->best_refuted) votes->best_refuted = strength;
-    }
-}
-
-static void judge_all(const sight_t *s, const ground_pair_t *forward, const oc_ground_params_t *params,
+/* Add what the other view says about each junction; looks that were made before
+ * are weighed again, not made again. looks may be NULL. is_ground: it says ground, and clearly. */
+static void judge_all(const sight_t *s, const oc_ground_params_t *params, const oc_ground_look_t looks[],
                       oc_ground_votes_t votes[], uint8_t is_ground[])
 {
     for (uint32_t i = 0; i < s->from->n_junctions; i++) {
-        uint8_t strength = 0;
-        const verdict_t verdict = judge(s, forward, params, &s->from->junctions[i], &strength);
-        is_ground[i] = verdict == VERDICT_GROUND;
-        vote(&votes[i], verdict, strength);
+        const double at[2] = {(double)s->from->junctions[i].x_px, (double)s->from->junctions[i].y_px};
+        oc_ground_look_t look = {.is_done = false};
+        oc_ground_pin_t pin;
+        double l;
+        is_ground[i] = 0;
+        if (looks) look = looks[i];
+        if (!look.is_done && !oc_ground_look_at(s, params, at, &look)) continue;
+        if (!oc_ground_weigh(s, params, at, &look, &l, &pin)) continue;
+        oc_ground_vote(&votes[i], l);
+        is_ground[i] = l >= (double)params->t_ground;
+    }
+}
+
+/* ---- pins ---- */
+
+/* The matches as pins: two junctions, each sigma_px off. */
+static void pins_from_matches(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
+                              const oc_ground_view_t *reference, const double H[9])
+{
+    ws->n_pins = 0;
+    for (uint32_t i = 0; i < ws->n_matches; i++) {
+        const oc_junction_t *a = &view->junctions[ws->matches[i].left];
+        const oc_junction_t *b = &reference->junctions[ws->matches[i].right];
+        double J[4] = {1.0, 0.0, 0.0, 1.0};
+        /* The left junction's error arrives magnified; its area stands for both axes. Where the Jacobian does not
+         * exist the pin is no inlier either. */
+        const oc_status_t status = oc_homography_jacobian(H, (double)a->x_px, (double)a->y_px, J);
+        const double area = status == OC_OK ? fabs(J[0] * J[3] - J[1] * J[2]) : 1.0;
+        ws->pins[ws->n_pins++] =
+            (oc_ground_pin_t){.x_px = a->x_px,
+                              .y_px = a->y_px,
+                              .x2_px = b->x_px,
+                              .y2_px = b->y_px,
+                              .variance_px2 = (float)(params->sigma_px * params->sigma_px * (1.0 + area))};
+    }
+}
+
+/* What was found on the ground as pins: pictures laid over each other, ten times
+ * better known than junctions. Junctions that come into reach are looked at.
+ * Returns the mean correlation of what was found. */
+static double pins_from_looks(oc_ground_ws_t *ws, const oc_ground_params_t *params, const sight_t *s)
+{
+    double sum = 0.0;
+    ws->n_pins = 0;
+    for (uint32_t i = 0; i < s->from->n_junctions; i++) {
+        const double at[2] = {(double)s->from->junctions[i].x_px, (double)s->from->junctions[i].y_px};
+        oc_ground_look_t *look = &ws->looks[i];
+        double l;
+        if (!look->is_done && !oc_ground_look_at(s, params, at, look)) continue;
+        if (!oc_ground_weigh(s, params, at, look, &l, &ws->pins[ws->n_pins])) continue;
+        if (!(l >= (double)params->t_ground)) continue;
+        sum += (double)look->ncc;
+        ws->n_pins++;
+    }
+    return ws->n_pins > 0 ? sum / ws->n_pins : 1.0;
+}
+
+static void looks_forget(oc_ground_ws_t *ws, uint32_t n)
+{
+    for (uint32_t i = 0; i < n; i++) ws->looks[i].is_done = false;
+}
+
+/* Lay the pictures over each other, fit the pair to that, and again with what
+ * has come into reach. Decides on smoothing. */
+static void register_pictures(oc_ground_ws_t *ws, const oc_ground_params_t *params, sight_t *s, ground_pair_t *pair,
+                              oc_ground_result_t *found)
+{
+    looks_forget(ws, s->from->n_junctions);
+    for (int round = 0; round < REGISTER_ROUNDS; round++) {
+        const double agreement = pins_from_looks(ws, params, s);
+        if (round == 0 && agreement < CLEAN_NCC) {
+            s->photo = (ground_photo_t){.noise_sd = SMOOTH_NOISE * s->photo.noise_sd, .is_smooth = true};
+            looks_forget(ws, s->from->n_junctions);
+            (void)pins_from_looks(ws, params, s);
+        }
+        if (!oc_ground_refit(ws, params, s->from, s->to, pair, found)) break;
     }
 }
 
@@ -233,7 +219,7 @@ static oc_status_t check_view(const oc_ground_view_t *v)
 
 /* First pass: junction pairs inside the windows that the margins allow. */
 static oc_status_t first_pass(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
-                              const oc_ground_view_t *reference, oc_ground_result_t *result)
+                              const oc_ground_view_t *reference, double H[9], oc_ground_result_t *result)
 {
     oc_pair_t prepared;
     const oc_status_t status = oc_pair_prepare(&prepared, &view->camera, &view->margin, &reference->camera,
@@ -245,11 +231,12 @@ static oc_status_t first_pass(oc_ground_ws_t *ws, const oc_ground_params_t *para
                            .right = reference,
                            .H = prepared.H,
                            .H_inv = H_inv,
-                           .window = &prepared,
+                           .prior = &prepared,
                            .chi2 = params->window_chi2,
                            .t_ncc = params->t_g};
     result->n_candidates = pair_up(ws, params, &how);
     result->n_matches = ws->n_matches;
+    memcpy(H, prepared.H, sizeof prepared.H);
     return OC_OK;
 }
 
@@ -259,7 +246,7 @@ static void keep_ground_matches(oc_ground_ws_t *ws, const uint8_t view_ground[],
     uint32_t n = 0;
     for (uint32_t i = 0; i < ws->n_matches; i++) {
         const oc_ground_match_t m = ws->matches[i];
-        if (!ws->is_inlier[i] || !view_ground[m.left] || !ref_ground[m.right]) continue;
+        if (!view_ground[m.left] || !ref_ground[m.right]) continue;
         ws->matches[n++] = m;
     }
     ws->n_matches = n;
@@ -278,36 +265,55 @@ oc_status_t oc_ground_match_views(oc_ground_ws_t *ws, const oc_ground_params_t *
 
     oc_ground_result_t found = {.is_refined = false};
     ws->n_matches = 0;
-    status = first_pass(ws, params, view, reference, &found);
+    double prior_H[9];
+    status = first_pass(ws, params, view, reference, prior_H, &found);
     if (status != OC_OK) return status;
     ground_pair_t pair;
-    oc_ground_refine(ws, params, view, reference, &pair, &found);
+    pins_from_matches(ws, params, view, reference, prior_H);
+    found.is_refined = oc_ground_fit(ws, params, view, reference, &pair, &found);
     if (!found.is_refined) {
         ws->n_matches = 0;
         *result = found;
         return OC_OK;
     }
 
-    /* Second pass: the refined homography leaves a window of t_H only. */
+    /* Second pass: the windows that the fit has left. */
     const pairing_t narrow = {.left = view,
                               .right = reference,
                               .H = pair.H,
                               .H_inv = pair.H_inv,
-                              .radius_px = (double)params->t_transfer_px,
+                              .refined = &pair,
+                              .sigma_px = params->sigma_px,
+                              .chi2 = params->window_chi2,
                               .t_ncc = params->t_g_second};
     (void)pair_up(ws, params, &narrow);
-    if (!oc_ground_refit(ws, params, view, reference, &pair, &found)) ws->n_matches = 0;
+    pins_from_matches(ws, params, view, reference, pair.H);
+    (void)oc_ground_refit(ws, params, view, reference, &pair, &found);
 
+    sight_t there = {
+        .from = view,
+        .to = reference,
+        .pair = &pair,
+        .forward = &pair,
+        .H = pair.H,
+        .H_inv = pair.H_inv,
+        .photo = {.noise_sd = hypot(oc_ground_noise_sd(&view->grey), oc_ground_noise_sd(&reference->grey))}};
+    register_pictures(ws, params, &there, &pair, &found);
     ground_pair_t reverse = pair;
     reverse.left = pair.right;
     reverse.right = pair.left;
     memcpy(reverse.H, pair.H_inv, sizeof reverse.H);
     memcpy(reverse.H_inv, pair.H, sizeof reverse.H_inv);
-    const sight_t there = {.from = view, .to = reference, .pair = &pair, .H = pair.H, .H_inv = pair.H_inv};
-    const sight_t back = {
-        .from = reference, .to = view, .pair = &reverse, .H = pair.H_inv, .H_inv = pair.H, .is_reverse = true};
-    judge_all(&there, &pair, params, votes, ws->view_ground);
-    judge_all(&back, &pair, params, ref_votes, ws->ref_ground);
+    const sight_t back = {.from = reference,
+                          .to = view,
+                          .pair = &reverse,
+                          .forward = &pair,
+                          .H = pair.H_inv,
+                          .H_inv = pair.H,
+                          .is_reverse = true,
+                          .photo = there.photo};
+    judge_all(&there, params, ws->looks, votes, ws->view_ground);
+    judge_all(&back, params, NULL, ref_votes, ws->ref_ground);
     keep_ground_matches(ws, ws->view_ground, ws->ref_ground);
     *result = found;
     return OC_OK;

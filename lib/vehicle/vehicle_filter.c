@@ -7,6 +7,12 @@
 /* Views that share less are not worth the time. */
 #define MIN_OVERLAP 0.05
 
+/* Stored views that references are chosen from. */
+#define MAX_CANDIDATES 16u
+
+/* How much less a cell needs another view when one has it well in sight. */
+#define COVERED_SHARE 0.6f
+
 static oc_ground_view_t ground_view_of(const stored_view_t *view)
 {
     return (oc_ground_view_t){.view = view->head.view,
@@ -17,38 +23,76 @@ static oc_ground_view_t ground_view_of(const stored_view_t *view)
                               .n_junctions = view->n_junctions};
 }
 
-/* The stored views that can judge this one, best first; the newer one of equals. */
-static uint32_t references_choose(const oc_vehicle_t *vehicle, const stored_view_t *fresh,
-                                  stored_view_t *chosen[OC_MAX_GROUND_REFERENCES])
+/* A stored view that may become a reference. */
+typedef struct candidate {
+    stored_view_t *view;
+    double overlap;
+    float worth[OC_GROUND_CELLS];
+} candidate_t;
+
+/* The stored views of greatest overlap, best first; the newer one of equals. */
+static uint32_t candidates_find(const oc_vehicle_t *vehicle, const stored_view_t *fresh,
+                                candidate_t candidates[MAX_CANDIDATES])
 {
-    double worth[OC_MAX_GROUND_REFERENCES];
-    const uint32_t limit = vehicle->config.ground.max_references;
     uint32_t n = 0;
     for (uint32_t age = 0; age < vehicle->n_stored; age++) {
-        stored_view_t *view = oc_vehicle_by_age(vehicle, age);
-        if (view == fresh || view->n_junctions == 0) continue;
-        const double overlap = oc_ground_overlap(&fresh->head.camera, &view->head.camera);
-        if (!(overlap >= MIN_OVERLAP)) continue;
-        if (n == limit && overlap <= worth[n - 1]) continue;
-        if (n < limit) n++;
+        candidate_t next = {.view = oc_vehicle_by_age(vehicle, age)};
+        if (next.view == fresh || next.view->n_junctions == 0) continue;
+        next.overlap = oc_ground_overlap(&fresh->head.camera, &next.view->head.camera, next.worth);
+        if (!(next.overlap >= MIN_OVERLAP)) continue;
+        if (n == MAX_CANDIDATES && next.overlap <= candidates[n - 1].overlap) continue;
+        if (n < MAX_CANDIDATES) n++;
         uint32_t at = n - 1;
-        for (; at > 0 && worth[at - 1] < overlap; at--) {
-            worth[at] = worth[at - 1];
-            chosen[at] = chosen[at - 1];
-        }
-        worth[at] = overlap;
-        chosen[at] = view;
+        for (; at > 0 && candidates[at - 1].overlap < next.overlap; at--) candidates[at] = candidates[at - 1];
+        candidates[at] = next;
     }
     return n;
 }
 
-/* Labels that the votes now decide; only an open one may change. */
-static void labels_update(stored_view_t *view)
+/* What a candidate adds to the cells as far as others have not covered them. */
+static double candidate_gain(const candidate_t *candidate, const float open[OC_GROUND_CELLS])
 {
+    double gain = 0.0;
+    for (uint32_t k = 0; k < OC_GROUND_CELLS; k++) gain += (double)(candidate->worth[k] * open[k]);
+    return gain;
+}
+
+/* The stored views that judge this one: one after the other the one that adds
+ * most, so that every corner of the image gets its share of them. */
+static uint32_t references_choose(const oc_vehicle_t *vehicle, const stored_view_t *fresh,
+                                  stored_view_t *chosen[OC_MAX_GROUND_REFERENCES])
+{
+    candidate_t candidates[MAX_CANDIDATES];
+    const uint32_t n_candidates = candidates_find(vehicle, fresh, candidates);
+    float open[OC_GROUND_CELLS];
+    for (uint32_t k = 0; k < OC_GROUND_CELLS; k++) open[k] = 1.0f;
+    uint32_t n = 0;
+    while (n < vehicle->config.ground.max_references && n < n_candidates) {
+        uint32_t best = 0;
+        double best_gain = -1.0;
+        for (uint32_t c = 0; c < n_candidates; c++) {
+            const double gain = candidates[c].view ? candidate_gain(&candidates[c], open) : -1.0;
+            if (gain <= best_gain) continue;
+            best = c;
+            best_gain = gain;
+        }
+        chosen[n++] = candidates[best].view;
+        candidates[best].view = NULL;
+        for (uint32_t k = 0; k < OC_GROUND_CELLS; k++) open[k] *= 1.0f - COVERED_SHARE * candidates[best].worth[k];
+    }
+    return n;
+}
+
+/* Labels that the votes now amount to. A ground junction that was never sent
+ * stays ground: the base does without it, whatever is learnt later. */
+static void labels_update(const oc_ground_params_t *params, stored_view_t *view)
+{
+    uint8_t is_sent[OC_MAX_JUNCTIONS] = {0};
+    for (uint32_t k = 0; k < view->n_sent; k++) is_sent[view->transmitted[k]] = 1;
     for (uint32_t i = 0; i < view->n_junctions; i++) {
         oc_junction_t *junction = &view->junctions[i];
-        if (junction->label != OC_LABEL_UNKNOWN) continue;
-        oc_ground_decide(&view->votes[i], &junction->label, &junction->confidence);
+        if (junction->label == OC_LABEL_GROUND && !is_sent[i]) continue;
+        oc_ground_decide(params, &view->votes[i], &junction->label, &junction->confidence);
     }
 }
 
@@ -66,7 +110,7 @@ void oc_vehicle_filter(oc_vehicle_t *vehicle, stored_view_t *fresh)
     stored_view_t *reference[OC_MAX_GROUND_REFERENCES];
     const uint32_t n = references_choose(vehicle, fresh, reference);
     const oc_ground_view_t left = ground_view_of(fresh);
-    fresh->n_ties = 0;
+    fresh->n_ties = fresh->n_sent = 0;
     for (uint32_t r = 0; r < n; r++) {
         const oc_ground_view_t right = ground_view_of(reference[r]);
         oc_ground_result_t result;
@@ -79,8 +123,8 @@ void oc_vehicle_filter(oc_vehicle_t *vehicle, stored_view_t *fresh)
                                                            fresh->ties + fresh->n_ties, OC_MAX_TIES - fresh->n_ties));
         uint8_t before[OC_MAX_JUNCTIONS];
         for (uint32_t i = 0; i < reference[r]->n_junctions; i++) before[i] = reference[r]->junctions[i].label;
-        labels_update(reference[r]);
+        labels_update(&vehicle->config.ground, reference[r]);
         relabels_note(reference[r], before);
     }
-    labels_update(fresh);
+    labels_update(&vehicle->config.ground, fresh);
 }

@@ -185,6 +185,8 @@ TEST_F(EvalRun, GroundLabelsAreHeldAgainstTheMask)
     const int n = before["ground"]["n"];
     EXPECT_EQ(after["ground"]["n"], n + 3 - 10);
     EXPECT_EQ(after["ground"]["correct"], n - 10);
+    EXPECT_EQ(before["ground"]["obstacle_as_ground"], 0.0);
+    EXPECT_GT(after["ground"]["obstacle_as_ground"], 0.0);
     EXPECT_LT(after["ground"]["recall"], 1.0);
     EXPECT_GT(after["ground"]["recall"], 1.0 - 11.0 / n * 4);
 }

@@ -15,7 +15,8 @@ What is judged (null, with a note on stderr, where the files for it are absent):
   ground     vehicle/junctions.json: junctions labelled ground; true ground is
              mask 0 or 254 without an obstacle pixel within 2 px; recall over
              true ground junctions with a partner within 2 px of their true
-             transfer in a stored view. Without that file: ground matches whose
+             transfer in a stored view; obstacle_as_ground: share of the junctions
+             within 2 px of an obstacle pixel that are labelled ground. Without that file: ground matches whose
              left apex is true ground and that are correct; no recall.
   boxes      given to obstacles one to one, best axis-aligned IoU first; obb_iou
              against the least-area upright box of the true mesh.

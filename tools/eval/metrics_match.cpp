@@ -34,45 +34,6 @@ std::optional<Eigen::Vector2d> transfer(const Truth &truth, std::size_t from, st
     return at->pixel;
 }
 
-bool has_partner(const Truth &truth, const std::vector<ViewJunctions> &all, std::size_t order, const FoundJunction &j)
-{
-    for (std::size_t k = 0; k < all.size(); k++) {
-        const bool is_stored = k < order || j.reference_view == all[k].view;
-        if (!is_stored || all[k].view == all[order].view) continue;
-        const auto at = transfer(truth, all[order].view, all[k].view, j.px);
-        if (!at) continue;
-        for (const FoundJunction &other : all[k].junctions)
-            if ((other.px - *at).norm() <= kTransferRadiusPx) return true;
-    }
-    return false;
-}
-
-ShareMetric ground_from_junctions(const Truth &truth, const std::vector<ViewJunctions> &all, Notes &notes)
-{
-    ShareMetric m;
-    int covisible = 0, found = 0, skipped = 0;
-    for (std::size_t order = 0; order < all.size(); order++) {
-        const auto &depth = truth.depth[all[order].view];
-        for (const FoundJunction &j : all[order].junctions) {
-            if (!depth) {
-                skipped++;
-                continue;
-            }
-            const bool is_true = is_true_ground(*depth, j.px);
-            const bool is_labelled = j.label == Label::kGround;
-            m.n += is_labelled;
-            m.correct += is_labelled && is_true;
-            if (!is_true || !has_partner(truth, all, order, j)) continue;
-            covisible++;
-            found += is_labelled;
-        }
-    }
-    close(m);
-    if (covisible > 0) m.recall = static_cast<double>(found) / covisible;
-    if (skipped > 0) notes.push_back(count_note("ground: junctions", skipped));
-    return m;
-}
-
 ShareMetric ground_from_matches(const Truth &truth, const std::vector<FoundMatch> &matches)
 {
     ShareMetric m;
@@ -114,14 +75,64 @@ bool is_true_ground(const DepthMap &map, const Eigen::Vector2d &pixel)
     const int x = static_cast<int>(std::lround(pixel.x()));
     const int y = static_cast<int>(std::lround(pixel.y()));
     if (x < 0 || y < 0 || x >= map.mask.cols || y >= map.mask.rows) return false;
-    if (!is_ground_code(map.mask.at<std::uint8_t>(y, x))) return false;
+    return is_ground_code(map.mask.at<std::uint8_t>(y, x)) && !is_true_obstacle(map, pixel);
+}
+
+bool is_true_obstacle(const DepthMap &map, const Eigen::Vector2d &pixel)
+{
+    const int x = static_cast<int>(std::lround(pixel.x()));
+    const int y = static_cast<int>(std::lround(pixel.y()));
     const int reach = static_cast<int>(kGroundRadiusPx) + 1;
     for (int v = std::max(0, y - reach); v <= std::min(map.mask.rows - 1, y + reach); v++)
         for (int u = std::max(0, x - reach); u <= std::min(map.mask.cols - 1, x + reach); u++)
             if (is_obstacle_code(map.mask.at<std::uint8_t>(v, u)) &&
                 (Eigen::Vector2d(u, v) - pixel).norm() <= kGroundRadiusPx)
-                return false;
-    return true;
+                return true;
+    return false;
+}
+
+bool is_covisible(const Truth &truth, const std::vector<ViewJunctions> &all, std::size_t order, const FoundJunction &j)
+{
+    for (std::size_t k = 0; k < all.size(); k++) {
+        const bool is_stored = k < order || j.reference_view == all[k].view;
+        if (!is_stored || all[k].view == all[order].view) continue;
+        const auto at = transfer(truth, all[order].view, all[k].view, j.px);
+        if (!at) continue;
+        for (const FoundJunction &other : all[k].junctions)
+            if ((other.px - *at).norm() <= kTransferRadiusPx) return true;
+    }
+    return false;
+}
+
+ShareMetric judge_ground(const Truth &truth, const std::vector<ViewJunctions> &all, Notes &notes)
+{
+    ShareMetric m;
+    int covisible = 0, found = 0, skipped = 0, obstacle = 0, lost = 0;
+    for (std::size_t order = 0; order < all.size(); order++) {
+        const auto &depth = truth.depth[all[order].view];
+        for (const FoundJunction &j : all[order].junctions) {
+            if (!depth) {
+                skipped++;
+                continue;
+            }
+            const bool is_true = is_true_ground(*depth, j.px);
+            const bool is_labelled = j.label == Label::kGround;
+            m.n += is_labelled;
+            m.correct += is_labelled && is_true;
+            if (is_true_obstacle(*depth, j.px)) {
+                obstacle++;
+                lost += is_labelled;
+            }
+            if (!is_true || !is_covisible(truth, all, order, j)) continue;
+            covisible++;
+            found += is_labelled;
+        }
+    }
+    close(m);
+    if (covisible > 0) m.recall = static_cast<double>(found) / covisible;
+    if (obstacle > 0) m.obstacle_as_ground = static_cast<double>(lost) / obstacle;
+    if (skipped > 0) notes.push_back(count_note("ground: junctions", skipped));
+    return m;
 }
 
 std::optional<ShareMetric> evaluate_matches(const Truth &truth, const Run &run, Notes &notes)
@@ -145,7 +156,7 @@ std::optional<ShareMetric> evaluate_matches(const Truth &truth, const Run &run, 
 std::optional<ShareMetric> evaluate_ground(const Truth &truth, const Run &run, Notes &notes)
 {
     if (!truth.has_depth()) return std::nullopt;
-    if (run.junctions) return ground_from_junctions(truth, *run.junctions, notes);
+    if (run.junctions) return judge_ground(truth, *run.junctions, notes);
     if (run.matches) return ground_from_matches(truth, *run.matches);
     notes.push_back("ground is null: neither vehicle/junctions.json nor matches.json is there");
     return std::nullopt;

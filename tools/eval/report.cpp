@@ -20,7 +20,10 @@ Out share_json(const std::optional<ShareMetric> &m, bool has_recall)
 {
     if (!m) return nullptr;
     Out o = {{"n", m->n}, {"correct", m->correct}, {"precision", maybe(m->precision)}};
-    if (has_recall) o["recall"] = maybe(m->recall);
+    if (has_recall) {
+        o["recall"] = maybe(m->recall);
+        o["obstacle_as_ground"] = maybe(m->obstacle_as_ground);
+    }
     return o;
 }
 
@@ -111,10 +114,11 @@ std::string percent(const std::optional<double> &x)
 std::string share_table(const Report &r)
 {
     Table t;
-    t.row({"", "n", "correct", "precision", "recall"});
+    t.row({"", "n", "correct", "precision", "recall", "obstacle as ground"});
     const auto add = [&](const char *name, const std::optional<ShareMetric> &m) {
-        if (!m) return t.row({name, "-", "-", "-", "-"});
-        t.row({name, std::to_string(m->n), std::to_string(m->correct), percent(m->precision), percent(m->recall)});
+        if (!m) return t.row({name, "-", "-", "-", "-", "-"});
+        t.row({name, std::to_string(m->n), std::to_string(m->correct), percent(m->precision), percent(m->recall),
+               percent(m->obstacle_as_ground)});
     };
     add("obstacle matches", r.matches);
     add("ground", r.ground);
