@@ -15,6 +15,9 @@
 #define LEAST_CONTRAST 0.7f
 #define LEAST_DERIVATIVE 0.5f
 
+/* A ridge further off than this many of its widths adds nothing. */
+#define RIVAL_WIDTHS 3.0f
+
 /* Share of the shortest length at which the last position may lie: noise hides single ones. */
 #define LEAST_LENGTH 0.8f
 
@@ -62,7 +65,8 @@ static oc_fit_walk_t walk_make(const oc_gradient_t *gradient, const oc_fit_rules
 }
 
 /* What the other branches add to this one's derivative. */
-static uint32_t rivals_make(const oc_fit_t *fit, uint32_t self, oc_fit_rival_t rivals[OC_FIT_MAX_BRANCHES])
+static uint32_t rivals_make(const oc_fit_t *fit, uint32_t self, float blur_px,
+                            oc_fit_rival_t rivals[OC_FIT_MAX_BRANCHES])
 {
     const oc_fit_branch_t *own = &fit->branch[self];
     uint32_t n = 0;
@@ -70,7 +74,10 @@ static uint32_t rivals_make(const oc_fit_t *fit, uint32_t self, oc_fit_rival_t r
         const oc_fit_branch_t *other = &fit->branch[j];
         const float agree = own->side * other->side * (own->ux * other->ux + own->uy * other->uy);
         if (j == self || fabsf(agree) < 0.02f) continue;
-        rivals[n++] = (oc_fit_rival_t){other->ux, other->uy, agree * other->amplitude};
+        const float cosine = own->ux * other->ux + own->uy * other->uy;
+        const float sine = fabsf(own->ux * other->uy - own->uy * other->ux);
+        const float apart = cosine > 0.0f ? (sine > 0.1f ? sine : 0.1f) : 1.0f;
+        rivals[n++] = (oc_fit_rival_t){other->ux, other->uy, agree * other->amplitude, RIVAL_WIDTHS * blur_px / apart};
     }
     return n;
 }
@@ -104,32 +111,11 @@ static void picks_collect(const oc_fit_profile_t *profile, uint32_t n_samples, c
     }
 }
 
-static void sums_make(const oc_fit_profile_t *profile, const fit_picks_t *picks, uint32_t n, oc_fit_sums_t *sums)
-{
-    oc_fit_sums_t s;
-    memset(&s, 0, sizeof s);
-    for (uint32_t i = 0; i < n; i++) {
-        const uint32_t m = picks->at[i];
-        const float gain = profile->gain[m], w = gain * gain;
-        const float t = profile->t[m], d = profile->d[m], wt = w * t, wd = w * d;
-        s.w += w;
-        s.wt += wt;
-        s.wtt += wt * t;
-        s.wd += wd;
-        s.wtd += wt * d;
-        s.wdd += wd * d;
-        s.value += profile->value[m] * gain;
-        if (t < FAR_PX) continue;
-        s.bend += profile->bend[m];
-        s.level += profile->value[m];
-    }
-    *sums = s;
-}
-
 /* The branch's own line through its first n positions; false when they do not make one. */
-static bool branch_solve(oc_fit_branch_t *branch, const oc_fit_profile_t *profile, const fit_picks_t *picks, uint32_t n)
+static bool branch_solve(const oc_kernels_t *kernels, oc_fit_branch_t *branch, const oc_fit_profile_t *profile,
+                         const fit_picks_t *picks, uint32_t n)
 {
-    sums_make(profile, picks, n, &branch->sums);
+    kernels->sums(profile, picks->at[n - 1] + 1u, FAR_PX, &branch->sums);
     const oc_fit_sums_t *s = &branch->sums;
     const float det = s->w * s->wtt - s->wt * s->wt;
     if (!(det > 1e-3f * s->w * s->w)) return false;
@@ -152,10 +138,11 @@ bool oc_judoca_branch_follow(const oc_gradient_t *gradient, const oc_fit_rules_t
     const oc_fit_walk_t walk = walk_make(gradient, rules, fit, branch, span);
     if (walk.n < MIN_SAMPLES) return false;
 
-    const float inv_s = 1.0f / sqrtf(fit->blur_px2), inv_st = 1.0f / sqrtf(fit->blur_px2 - OC_FIT_DIFFERENCE_PX2);
+    const float blur_px = sqrtf(fit->blur_px2);
+    const float inv_s = 1.0f / blur_px, inv_st = 1.0f / sqrtf(fit->blur_px2 - OC_FIT_DIFFERENCE_PX2);
     oc_fit_rival_t rivals[OC_FIT_MAX_BRANCHES];
     oc_fit_profile_t profile;
-    gradient->kernels->profile(&walk, rivals, span->has_model ? rivals_make(fit, i, rivals) : 0,
+    gradient->kernels->profile(&walk, rivals, span->has_model ? rivals_make(fit, i, blur_px, rivals) : 0,
                                fit->blur_px2 / (walk.own_major * walk.own_major), inv_s, inv_st, &profile);
 
     fit_picks_t picks;
@@ -168,7 +155,7 @@ bool oc_judoca_branch_follow(const oc_gradient_t *gradient, const oc_fit_rules_t
     for (uint32_t n = picks.n; n >= n_short; n = n > n_short + 2 ? (n + n_short) / 2 : n - 1) {
         const float last_px = profile.t[picks.at[n - 1]];
         if (last_px < strict_px && last_px < tolerant_px) return false;
-        if (!branch_solve(branch, &profile, &picks, n)) return false;
+        if (!branch_solve(gradient->kernels, branch, &profile, &picks, n)) return false;
         const float limit = n > n_short ? GROW_RMS_PX : rules->max_rms_px;
         if (branch->rms_px <= limit && branch->share >= rules->s_j) {
             return branch->amplitude >= LEAST_CONTRAST * rules->t_b * (float)OC_GRADIENT_ONE;

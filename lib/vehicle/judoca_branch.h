@@ -33,14 +33,6 @@ typedef struct oc_fit_rules {
     float max_rms_px, max_apex_sigma_px;
 } oc_fit_rules_t;
 
-/* Weighted sums over the ridge positions of one branch, in its own frame at
- * the apex: t along the branch, d across it, px. */
-typedef struct oc_fit_sums {
-    float w, wt, wtt, wd, wtd, wdd;
-    float value;       /* of derivative times gain; w = gain^2 */
-    float bend, level; /* of far samples: sum of 2 v - before - after, and of v */
-} oc_fit_sums_t;
-
 /* One branch as last fitted. */
 typedef struct oc_fit_branch {
     float ux, uy, side;

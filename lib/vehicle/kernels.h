@@ -5,6 +5,7 @@
 #define OUTCROP_VEHICLE_KERNELS_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #ifdef __cplusplus
@@ -69,6 +70,7 @@ typedef struct oc_fit_walk {
 typedef struct oc_fit_rival {
     float ux, uy;    /* along the rival */
     float amplitude; /* of its ridge in this branch's derivative, signed */
+    float reach_px;  /* further out on this branch it adds nothing */
 } oc_fit_rival_t;
 
 /* Samples of a branch, outwards; t along it from the apex, d across it on the normal (-uy, ux), px. */
@@ -79,6 +81,14 @@ typedef struct oc_fit_profile {
     float bend[OC_FIT_SAMPLES];    /* 2 value - before - after */
     int32_t found[OC_FIT_SAMPLES]; /* 0 no edge, 1 an edge that does not say where, 2 a position */
 } oc_fit_profile_t;
+
+/* Weighted sums over the ridge positions of one branch, in its own frame at
+ * the apex: t along the branch, d across it, px. */
+typedef struct oc_fit_sums {
+    float w, wt, wtt, wd, wtd, wdd;
+    float value;       /* of derivative times gain; w = gain^2 */
+    float bend, level; /* of far samples: sum of 2 v - before - after, and of v */
+} oc_fit_sums_t;
 
 /* Round the apex: derivatives across OC_RAYS directions. */
 #define OC_RING_SAMPLES 5u
@@ -117,6 +127,9 @@ typedef struct oc_kernels {
     /* Derivative across each direction, mean of the samples; 0 unless all but one of them are beyond floor with the
      * mean's sign. apex points to the pair of the apex' pixel, width is the planes' pitch in pixels. */
     void (*ring)(const oc_ring_table_t *table, const int16_t *apex, int32_t width, float floor, float ring[OC_RAYS]);
+
+    /* Sums over the positions before sample end; those from far_px on tell the blur. */
+    void (*sums)(const oc_fit_profile_t *profile, uint32_t end, float far_px, oc_fit_sums_t *sums);
 
     /* Ridge positions along a branch, what the rivals add taken off. s2 is the
      * square of the ridge's Gaussian width along the minor axis, px; inv_s one

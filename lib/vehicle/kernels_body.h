@@ -346,26 +346,30 @@ typedef struct kernel_taps {
 
 KERNEL_INLINE void taps_take(const oc_fit_walk_t *walk, kernel_taps_t *taps, const int32_t reach)
 {
-    const int32_t half = reach + 1, n_taps = 2 * half + 1;
-    int32_t major = walk->first;
+    const int32_t half = reach + 1, n_taps = 2 * half + 1, highest = walk->n_minor - 1 - half;
+    const float slope = walk->slope, a_major = walk->a_major, a_minor = walk->a_minor;
+    const int32_t first = walk->first, sign = walk->sign, n = (int32_t)walk->n;
+    int32_t at[OC_FIT_SAMPLES];
     taps->n_lanes = (walk->n + 7u) / 8u * 8u;
-    for (uint32_t m = 0; m < walk->n; m++, major += walk->sign) {
-        const float from_apex = (float)major - walk->a_major;
-        const float expected = walk->a_minor + from_apex * walk->slope;
-        int32_t centre = (int32_t)floorf(expected + 0.5f);
-        const int32_t is_inside = centre - half >= 0 && centre + half < walk->n_minor;
-        centre = is_inside ? centre : half;
-        const int16_t *at = walk->dxdy + 2 * (major * walk->step_major + (centre - half) * walk->step_minor);
-        for (int32_t k = 0; k < n_taps; k++, at += 2 * walk->step_minor) memcpy(&taps->pair[k][m], at, sizeof(int32_t));
+    for (int32_t m = 0; m < (int32_t)taps->n_lanes; m++) {
+        const int32_t major = first + sign * (m < n ? m : n - 1);
+        const float from_apex = (float)major - a_major;
+        const float expected = a_minor + from_apex * slope;
+        /* Away from the image by less than the shift, so the cut is a floor. */
+        const int32_t nearest = (int32_t)(expected + 64.5f) - 64;
+        const int32_t low = nearest < half ? half : nearest;
+        const int32_t centre = low > highest ? highest : low;
+        at[m] = major * walk->step_major + (centre - half) * walk->step_minor;
         taps->major[m] = from_apex;
-        taps->centre[m] = (float)centre - walk->a_minor;
+        taps->centre[m] = (float)centre - a_minor;
         taps->expected[m] = expected - (float)centre;
-        taps->is_inside[m] = is_inside;
+        taps->is_inside[m] = (int32_t)(centre == nearest) & (int32_t)(m < n);
     }
-    for (uint32_t m = walk->n; m < taps->n_lanes; m++) {
-        for (int32_t k = 0; k < n_taps; k++) taps->pair[k][m] = 0;
-        taps->major[m] = taps->centre[m] = taps->expected[m] = 0.0f;
-        taps->is_inside[m] = 0;
+    for (uint32_t m = 0; m < taps->n_lanes; m++) {
+        const int16_t *from = walk->dxdy + 2 * (ptrdiff_t)at[m];
+        for (int32_t k = 0; k < n_taps; k++, from += 2 * walk->step_minor) {
+            memcpy(&taps->pair[k][m], from, sizeof(int32_t));
+        }
     }
     const float nx = walk->nx, ny = walk->ny;
     for (int32_t k = 0; k < n_taps; k++) {
@@ -411,6 +415,16 @@ KERNEL_INLINE void ridge_find(const kernel_taps_t *taps, kernel_ridge_t *ridge, 
     }
 }
 
+/* Lanes that hold the samples up to a distance from the apex. */
+KERNEL_INLINE uint32_t lanes_until(const oc_fit_walk_t *walk, const kernel_taps_t *taps, float reach_px)
+{
+    const float major = walk->own_major < 0.0f ? -walk->own_major : walk->own_major;
+    const float first = taps->major[0] < 0.0f ? -taps->major[0] : taps->major[0];
+    const float n = reach_px * major - first + 1.0f;
+    if (!(n < (float)taps->n_lanes)) return taps->n_lanes;
+    return n > 0.0f ? ((uint32_t)n + 7u) / 8u * 8u : 0u;
+}
+
 /* Take off what a rival branch adds to the three taps. */
 KERNEL_INLINE void ridge_clear(const oc_fit_walk_t *walk, const kernel_taps_t *taps, const oc_fit_rival_t *rival,
                                float inv_s, float inv_st, kernel_ridge_t *ridge)
@@ -418,7 +432,8 @@ KERNEL_INLINE void ridge_clear(const oc_fit_walk_t *walk, const kernel_taps_t *t
     const bool flat = walk->is_flat;
     const float u_major = flat ? rival->ux : rival->uy, u_minor = flat ? rival->uy : rival->ux;
     const float amplitude = rival->amplitude;
-    for (uint32_t m = 0; m < taps->n_lanes; m++) {
+    const uint32_t n_lanes = lanes_until(walk, taps, rival->reach_px);
+    for (uint32_t m = 0; m < n_lanes; m++) {
         const float minor = taps->centre[m] + ridge->offset[m];
         const float t = (taps->major[m] * u_major + minor * u_minor) * inv_st, dt = u_minor * inv_st;
         const float d = (minor * u_major - taps->major[m] * u_minor) * inv_s, dd = u_major * inv_s;
@@ -434,7 +449,8 @@ KERNEL_INLINE void ridge_level(const oc_fit_walk_t *walk, const kernel_taps_t *t
                                kernel_ridge_t *ridge)
 {
     const float u_major = walk->own_major * inv_st, u_minor = walk->own_minor * inv_st;
-    for (uint32_t m = 0; m < taps->n_lanes; m++) {
+    const uint32_t n_lanes = lanes_until(walk, taps, 3.0f / inv_st + 1.0f);
+    for (uint32_t m = 0; m < n_lanes; m++) {
         const float minor = taps->centre[m] + ridge->offset[m];
         const float t = taps->major[m] * u_major + minor * u_minor;
         const float here = step_up(t);
@@ -497,6 +513,56 @@ static void kernel_profile(const oc_fit_walk_t *walk, const oc_fit_rival_t rival
     }
 }
 
+/* ---- sums ---- */
+
+typedef float lanes_t __attribute__((vector_size(32)));
+typedef int32_t lanes_mask_t __attribute__((vector_size(32)));
+
+KERNEL_INLINE lanes_t lanes_load(const float *from)
+{
+    lanes_t v;
+    memcpy(&v, from, sizeof v);
+    return v;
+}
+
+KERNEL_INLINE lanes_t lanes_where(lanes_mask_t mask, lanes_t v)
+{
+    return (lanes_t)(mask & (lanes_mask_t)v);
+}
+
+/* Lanes are summed apart and added up in one fixed order. */
+KERNEL_INLINE float lanes_sum(lanes_t v)
+{
+    return ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7]));
+}
+
+static void kernel_sums(const oc_fit_profile_t *p, uint32_t end, float far_px, oc_fit_sums_t *sums)
+{
+    static const lanes_mask_t order = {0, 1, 2, 3, 4, 5, 6, 7};
+    lanes_t w = {0}, wt = w, wtt = w, wd = w, wtd = w, wdd = w, value = w, bend = w, level = w;
+    for (uint32_t m = 0; m < end; m += 8) {
+        lanes_mask_t found;
+        memcpy(&found, p->found + m, sizeof found);
+        const lanes_mask_t counts = (found == 2) & (order < (int32_t)(end - m));
+        const lanes_t t = lanes_load(p->t + m), d = lanes_load(p->d + m);
+        const lanes_t gain = lanes_where(counts, lanes_load(p->gain + m));
+        const lanes_t v = lanes_where(counts, lanes_load(p->value + m));
+        const lanes_mask_t is_far = counts & (t >= far_px);
+        const lanes_t weight = gain * gain, weight_t = weight * t, weight_d = weight * d;
+        w += weight;
+        wt += weight_t;
+        wtt += weight_t * t;
+        wd += weight_d;
+        wtd += weight_t * d;
+        wdd += weight_d * d;
+        value += v * gain;
+        bend += lanes_where(is_far, lanes_load(p->bend + m));
+        level += lanes_where(is_far, v);
+    }
+    *sums = (oc_fit_sums_t){lanes_sum(w),   lanes_sum(wt),    lanes_sum(wtt),  lanes_sum(wd),   lanes_sum(wtd),
+                            lanes_sum(wdd), lanes_sum(value), lanes_sum(bend), lanes_sum(level)};
+}
+
 /* ---- round the apex ---- */
 
 static void kernel_ring(const oc_ring_table_t *table, const int16_t *apex, int32_t width, float floor,
@@ -534,6 +600,7 @@ const oc_kernels_t OC_KERNELS_TABLE = {
     .rays = kernel_rays,
     .ring = kernel_ring,
     .profile = kernel_profile,
+    .sums = kernel_sums,
 };
 
 #endif
