@@ -252,6 +252,55 @@ static void keep_ground_matches(oc_ground_ws_t *ws, const uint8_t view_ground[],
     ws->n_matches = n;
 }
 
+/* Second pass: junction pairs in the windows that the fit has left. */
+static void second_pass(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
+                        const oc_ground_view_t *reference, ground_pair_t *pair, oc_ground_result_t *found)
+{
+    const pairing_t narrow = {.left = view,
+                              .right = reference,
+                              .H = pair->H,
+                              .H_inv = pair->H_inv,
+                              .refined = pair,
+                              .sigma_px = params->sigma_px,
+                              .chi2 = params->window_chi2,
+                              .t_ncc = params->t_g_second};
+    (void)pair_up(ws, params, &narrow);
+    pins_from_matches(ws, params, view, reference, pair->H);
+    (void)oc_ground_refit(ws, params, view, reference, pair, found);
+}
+
+/* Looks of both views into each other: the pair's last fit, votes, and the matches that stay. */
+static void judge_both(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
+                       const oc_ground_view_t *reference, ground_pair_t *pair, oc_ground_votes_t votes[],
+                       oc_ground_votes_t ref_votes[], oc_ground_result_t *found)
+{
+    sight_t there = {
+        .from = view,
+        .to = reference,
+        .pair = pair,
+        .forward = pair,
+        .H = pair->H,
+        .H_inv = pair->H_inv,
+        .photo = {.noise_sd = hypot(oc_ground_noise_sd(&view->grey), oc_ground_noise_sd(&reference->grey))}};
+    register_pictures(ws, params, &there, pair, found);
+    ground_pair_t reverse = *pair;
+    reverse.left = pair->right;
+    reverse.right = pair->left;
+    memcpy(reverse.H, pair->H_inv, sizeof reverse.H);
+    memcpy(reverse.H_inv, pair->H, sizeof reverse.H_inv);
+    const sight_t back = {.from = reference,
+                          .to = view,
+                          .pair = &reverse,
+                          .forward = pair,
+                          .H = pair->H_inv,
+                          .H_inv = pair->H,
+                          .is_reverse = true,
+                          .photo = there.photo};
+    judge_all(&there, params, ws->looks, votes, ws->view_ground);
+    judge_all(&back, params, NULL, ref_votes, ws->ref_ground);
+    keep_ground_matches(ws, ws->view_ground, ws->ref_ground);
+}
+
 oc_status_t oc_ground_match_views(oc_ground_ws_t *ws, const oc_ground_params_t *params, const oc_ground_view_t *view,
                                   const oc_ground_view_t *reference, oc_ground_votes_t votes[],
                                   oc_ground_votes_t ref_votes[], oc_ground_result_t *result)
@@ -277,44 +326,8 @@ oc_status_t oc_ground_match_views(oc_ground_ws_t *ws, const oc_ground_params_t *
         return OC_OK;
     }
 
-    /* Second pass: the windows that the fit has left. */
-    const pairing_t narrow = {.left = view,
-                              .right = reference,
-                              .H = pair.H,
-                              .H_inv = pair.H_inv,
-                              .refined = &pair,
-                              .sigma_px = params->sigma_px,
-                              .chi2 = params->window_chi2,
-                              .t_ncc = params->t_g_second};
-    (void)pair_up(ws, params, &narrow);
-    pins_from_matches(ws, params, view, reference, pair.H);
-    (void)oc_ground_refit(ws, params, view, reference, &pair, &found);
-
-    sight_t there = {
-        .from = view,
-        .to = reference,
-        .pair = &pair,
-        .forward = &pair,
-        .H = pair.H,
-        .H_inv = pair.H_inv,
-        .photo = {.noise_sd = hypot(oc_ground_noise_sd(&view->grey), oc_ground_noise_sd(&reference->grey))}};
-    register_pictures(ws, params, &there, &pair, &found);
-    ground_pair_t reverse = pair;
-    reverse.left = pair.right;
-    reverse.right = pair.left;
-    memcpy(reverse.H, pair.H_inv, sizeof reverse.H);
-    memcpy(reverse.H_inv, pair.H, sizeof reverse.H_inv);
-    const sight_t back = {.from = reference,
-                          .to = view,
-                          .pair = &reverse,
-                          .forward = &pair,
-                          .H = pair.H_inv,
-                          .H_inv = pair.H,
-                          .is_reverse = true,
-                          .photo = there.photo};
-    judge_all(&there, params, ws->looks, votes, ws->view_ground);
-    judge_all(&back, params, NULL, ref_votes, ws->ref_ground);
-    keep_ground_matches(ws, ws->view_ground, ws->ref_ground);
+    second_pass(ws, params, view, reference, &pair, &found);
+    judge_both(ws, params, view, reference, &pair, votes, ref_votes, &found);
     *result = found;
     return OC_OK;
 }

@@ -27,7 +27,7 @@ static oc_ground_view_t ground_view_of(const stored_view_t *view)
 typedef struct candidate {
     stored_view_t *view;
     double overlap;
-    float worth[OC_GROUND_CELLS];
+    uint8_t worth[OC_GROUND_CELLS]; /* 0..255 for 0..1; sixteen of these are on the stack */
 } candidate_t;
 
 /* The stored views of greatest overlap, best first; the newer one of equals. */
@@ -38,8 +38,10 @@ static uint32_t candidates_find(const oc_vehicle_t *vehicle, const stored_view_t
     for (uint32_t age = 0; age < vehicle->n_stored; age++) {
         candidate_t next = {.view = oc_vehicle_by_age(vehicle, age)};
         if (next.view == fresh || next.view->n_junctions == 0) continue;
-        next.overlap = oc_ground_overlap(&fresh->head.camera, &next.view->head.camera, next.worth);
+        float worth[OC_GROUND_CELLS];
+        next.overlap = oc_ground_overlap(&fresh->head.camera, &next.view->head.camera, worth);
         if (!(next.overlap >= MIN_OVERLAP)) continue;
+        for (uint32_t k = 0; k < OC_GROUND_CELLS; k++) next.worth[k] = (uint8_t)(255.0f * worth[k] + 0.5f);
         if (n == MAX_CANDIDATES && next.overlap <= candidates[n - 1].overlap) continue;
         if (n < MAX_CANDIDATES) n++;
         uint32_t at = n - 1;
@@ -53,7 +55,7 @@ static uint32_t candidates_find(const oc_vehicle_t *vehicle, const stored_view_t
 static double candidate_gain(const candidate_t *candidate, const float open[OC_GROUND_CELLS])
 {
     double gain = 0.0;
-    for (uint32_t k = 0; k < OC_GROUND_CELLS; k++) gain += (double)(candidate->worth[k] * open[k]);
+    for (uint32_t k = 0; k < OC_GROUND_CELLS; k++) gain += (double)((float)candidate->worth[k] * open[k]);
     return gain;
 }
 
@@ -78,7 +80,9 @@ static uint32_t references_choose(const oc_vehicle_t *vehicle, const stored_view
         }
         chosen[n++] = candidates[best].view;
         candidates[best].view = NULL;
-        for (uint32_t k = 0; k < OC_GROUND_CELLS; k++) open[k] *= 1.0f - COVERED_SHARE * candidates[best].worth[k];
+        for (uint32_t k = 0; k < OC_GROUND_CELLS; k++) {
+            open[k] *= 1.0f - COVERED_SHARE / 255.0f * (float)candidates[best].worth[k];
+        }
     }
     return n;
 }

@@ -30,68 +30,93 @@ void write_json(const std::string &file, const Json &json)
     if (!out.flush()) throw std::runtime_error(file + ": cannot be written");
 }
 
+struct Options {
+    std::vector<std::string> sites;
+    std::string json_file;
+    outcrop::bench::LabelOptions labels;
+    outcrop::bench::SpeedOptions speed;
+    outcrop::bench::TableOptions table;
+};
+
+CLI::App *add_labels(CLI::App &app, Options &o)
+{
+    auto *sub = app.add_subcommand("labels", "labels of whole runs against the sites' truth");
+    sub->add_option("SITE", o.sites, "site folders")->required();
+    sub->add_option("--poses", o.labels.modes, "exact, or as outcrop-drive --perturb: 1 2 3:drift");
+    sub->add_option("--images", o.labels.images, "pictures from this folder of the site");
+    sub->add_flag("--errors", o.labels.lists_errors, "one line per wrong label");
+    sub->add_flag("--all", o.labels.lists_all, "one line per junction");
+    sub->add_option("--json", o.json_file, "also write the figures here");
+    return sub;
+}
+
+CLI::App *add_speed(CLI::App &app, Options &o)
+{
+    auto *sub = app.add_subcommand("speed", "milliseconds a pair, each view against the one before it");
+    sub->add_option("SITE", o.sites, "site folders")->required();
+    sub->add_option("--poses", o.speed.poses, "exact, or as outcrop-drive --perturb")->capture_default_str();
+    sub->add_option("--junctions", o.speed.n_junctions, "best of each view")
+        ->check(CLI::Range(1u, OC_MAX_JUNCTIONS))
+        ->capture_default_str();
+    sub->add_option("--repeats", o.speed.repeats, "the quickest counts")->check(CLI::Range(1, 1000));
+    sub->add_option("--json", o.json_file, "also write the figures here");
+    return sub;
+}
+
+CLI::App *add_table(CLI::App &app, Options &o)
+{
+    auto *sub = app.add_subcommand("table", "table 4.1 of the thesis: windows by t_g, the thesis' form and ours");
+    sub->add_option("SITE", o.table.site, "site folder (the thesis': cubes)")->required();
+    sub->add_option("--poses", o.table.poses, "exact, or as outcrop-drive --perturb")->capture_default_str();
+    sub->add_option("--left", o.table.left, "view")->capture_default_str();
+    sub->add_option("--right", o.table.right, "view")->capture_default_str();
+    sub->add_option("--junctions", o.table.n_junctions, "best of each view")
+        ->check(CLI::Range(1u, OC_MAX_JUNCTIONS))
+        ->capture_default_str();
+    sub->add_option("--json", o.json_file, "also write the figures here");
+    return sub;
+}
+
+// Each site in turn, its figures under its name.
+template <typename Measure>
+Json for_each_site(const std::vector<std::string> &sites, Measure measure)
+{
+    Json out = Json::object();
+    for (const std::string &site : sites) {
+        std::printf("%s\n", site.c_str());
+        out[name_of(site)] = measure(site);
+    }
+    return out;
+}
+
 } // namespace
 
 int main(int argc, char **argv)
 {
     CLI::App app("The ground filter on site folders, without a link.", "outcrop-bench-ground");
     app.require_subcommand(1);
-    std::string json_file;
-
-    auto *labels = app.add_subcommand("labels", "labels of whole runs against the sites' truth");
-    std::vector<std::string> sites;
-    outcrop::bench::LabelOptions options;
-    labels->add_option("SITE", sites, "site folders")->required();
-    labels->add_option("--poses", options.modes, "exact, or as outcrop-drive --perturb: 1 2 3:drift");
-    labels->add_option("--images", options.images, "pictures from this folder of the site");
-    labels->add_flag("--errors", options.lists_errors, "one line per wrong label");
-    labels->add_flag("--all", options.lists_all, "one line per junction");
-    labels->add_option("--json", json_file, "also write the figures here");
-
-    auto *speed = app.add_subcommand("speed", "milliseconds a pair, each view against the one before it");
-    outcrop::bench::SpeedOptions speed_options;
-    speed->add_option("SITE", sites, "site folders")->required();
-    speed->add_option("--poses", speed_options.poses, "exact, or as outcrop-drive --perturb")->capture_default_str();
-    speed->add_option("--junctions", speed_options.n_junctions, "best of each view")
-        ->check(CLI::Range(1u, OC_MAX_JUNCTIONS))
-        ->capture_default_str();
-    speed->add_option("--repeats", speed_options.repeats, "the quickest counts")->check(CLI::Range(1, 1000));
-    speed->add_option("--json", json_file, "also write the figures here");
-
-    auto *table = app.add_subcommand("table", "table 4.1 of the thesis: windows by t_g, the thesis' form and ours");
-    outcrop::bench::TableOptions table_options;
-    table->add_option("SITE", table_options.site, "site folder (the thesis': cubes)")->required();
-    table->add_option("--poses", table_options.poses, "exact, or as outcrop-drive --perturb")->capture_default_str();
-    table->add_option("--left", table_options.left, "view")->capture_default_str();
-    table->add_option("--right", table_options.right, "view")->capture_default_str();
-    table->add_option("--junctions", table_options.n_junctions, "best of each view")
-        ->check(CLI::Range(1u, OC_MAX_JUNCTIONS))
-        ->capture_default_str();
-    table->add_option("--json", json_file, "also write the figures here");
-
+    Options o;
+    const auto *labels = add_labels(app, o), *speed = add_speed(app, o);
+    (void)add_table(app, o);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError &e) {
         return app.exit(e) == 0 ? 0 : 2;
     }
     try {
-        Json out = Json::object();
         if (labels->parsed()) {
-            for (const std::string &site : sites) {
-                std::printf("%s\n", site.c_str());
-                options.site = site;
-                out[name_of(site)] = outcrop::bench::measure_labels(options);
-            }
+            write_json(o.json_file, for_each_site(o.sites, [&](const std::string &site) {
+                           o.labels.site = site;
+                           return outcrop::bench::measure_labels(o.labels);
+                       }));
+        } else if (speed->parsed()) {
+            write_json(o.json_file, for_each_site(o.sites, [&](const std::string &site) {
+                           o.speed.site = site;
+                           return outcrop::bench::measure_speed(o.speed);
+                       }));
+        } else {
+            write_json(o.json_file, {{name_of(o.table.site), outcrop::bench::measure_table(o.table)}});
         }
-        if (speed->parsed()) {
-            for (const std::string &site : sites) {
-                std::printf("%s\n", site.c_str());
-                speed_options.site = site;
-                out[name_of(site)] = outcrop::bench::measure_speed(speed_options);
-            }
-        }
-        if (table->parsed()) out[name_of(table_options.site)] = outcrop::bench::measure_table(table_options);
-        write_json(json_file, out);
     } catch (const std::exception &e) {
         std::cerr << "outcrop-bench-ground: " << e.what() << '\n';
         return 1;
