@@ -30,7 +30,7 @@ oc_judoca_params_t oc_judoca_defaults(void)
         .max_apex_sigma_px = 1.0f,
         .min_distance_px = 3.0f,
         .max_junctions = 600,
-        .max_candidates = 2000,
+        .max_candidates = 0,
         .spread_cell_px = 40,
         .method = OC_JUDOCA_REFINED,
         .simd = OC_SIMD_AUTO,
@@ -52,9 +52,9 @@ bool oc_judoca_params_are_valid(const oc_judoca_params_t *p)
            p->lambda_min_px >= 4 && p->lambda_min_px <= p->lambda_px && in_range(p->min_angle_rad, 0.1f, 1.0f) &&
            in_range(p->min_bend_rad, 0.05f, 1.0f) && in_range(p->max_rms_px, 0.1f, 2.0f) &&
            in_range(p->max_apex_sigma_px, 0.1f, 3.0f) && in_range(p->min_distance_px, 1.0f, 20.0f) &&
-           p->max_junctions >= 1 && p->max_junctions <= OC_MAX_JUNCTIONS && p->max_candidates >= 16 &&
-           p->max_candidates <= OC_JUDOCA_MAX_CANDIDATES && p->spread_cell_px >= 8 &&
-           p->spread_cell_px <= OC_MAX_IMAGE_SIDE &&
+           p->max_junctions >= 1 && p->max_junctions <= OC_MAX_JUNCTIONS &&
+           (p->max_candidates == 0 || p->max_candidates >= 16) && p->max_candidates <= OC_JUDOCA_MAX_CANDIDATES &&
+           p->spread_cell_px >= 8 && p->spread_cell_px <= OC_MAX_IMAGE_SIDE &&
            (p->method == OC_JUDOCA_REFINED || p->method == OC_JUDOCA_THESIS) &&
            (uint32_t)p->simd <= (uint32_t)OC_SIMD_AVX2;
 }
@@ -206,9 +206,15 @@ typedef struct places_choice {
     uint32_t met;
 } places_choice_t;
 
+static uint32_t candidates_limit(const oc_judoca_ws_t *ws)
+{
+    if (ws->params.max_candidates > 0) return ws->params.max_candidates;
+    return ws->gradient.width_px * ws->gradient.height_px / OC_JUDOCA_PX_PER_CANDIDATE + 64u;
+}
+
 static places_choice_t places_choose(const oc_judoca_ws_t *ws, uint32_t n)
 {
-    const uint32_t limit = ws->params.max_candidates;
+    const uint32_t limit = candidates_limit(ws);
     uint32_t histogram[PRESCORE_BINS] = {0};
     for (uint32_t i = 0; i < n; i++) histogram[ws->search.place[i].prescore / (65536u / PRESCORE_BINS)]++;
     uint32_t bin = PRESCORE_BINS - 1u, sum = 0;

@@ -265,7 +265,7 @@ static bool fit_pass(const oc_gradient_t *gradient, const oc_fit_rules_t *rules,
         if (reach->across_px > 0) span.inner_px = span.crowded_px;
         oc_fit_branch_t branch = fit->branch[i];
         bool holds = branch_follow_from(gradient, rules, fit, i, reach, &span, &branch);
-        if (!holds && span.inner_px > reach->inner_px + 0.5f && (fit->branch[i].n > 0.0f || !reach->has_model)) {
+        if (!holds && span.inner_px > reach->inner_px + 0.5f && fit->branch[i].n > 0.0f) {
             span.inner_px = reach->inner_px;
             branch = fit->branch[i];
             holds = branch_follow_from(gradient, rules, fit, i, reach, &span, &branch);

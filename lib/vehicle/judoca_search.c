@@ -34,6 +34,11 @@
 /* Contrast at which the prescore reaches one half, grey levels per px. */
 #define HALF_CONTRAST 10.0f
 
+/* Places of 64 x 64 pixels are compared in this many steps of the prescore; the one behind CROWD_HALF better ones
+ * counts half. */
+#define CROWD_BINS 64u
+#define CROWD_HALF 16u
+
 static uint32_t tile_pitch(uint32_t n_columns)
 {
     return 8u * n_columns + 16u;
@@ -332,6 +337,25 @@ static void look_cluster(oc_search_t *search, look_t *look)
     }
 }
 
+/* Lower the prescore of what stands behind many in its band, so that a limit
+ * on the fits is shared over the image. */
+static void look_spread(oc_search_t *search, uint32_t first)
+{
+    const uint32_t end = search->n_places < search->max_places ? search->n_places : search->max_places;
+    uint32_t before[CROWD_BINS + 1] = {0};
+    for (uint32_t i = first; i < end; i++) before[search->place[i].prescore / (65536u / CROWD_BINS)]++;
+    for (uint32_t bin = CROWD_BINS, sum = 0; bin-- > 0;) {
+        const uint32_t n = before[bin];
+        before[bin] = sum;
+        sum += n;
+    }
+    for (uint32_t i = first; i < end; i++) {
+        oc_place_t *place = &search->place[i];
+        const uint32_t rank = before[place->prescore / (65536u / CROWD_BINS)];
+        place->prescore = (uint16_t)(place->prescore * CROWD_HALF / (CROWD_HALF + rank));
+    }
+}
+
 /* Search one band of a column; false when there was nothing to look at. */
 static bool look_band(oc_search_t *search, look_t *look)
 {
@@ -378,7 +402,10 @@ static void search_look(oc_search_t *search, const oc_gradient_t *gradient, uint
     for (uint32_t slot = 0; slot < 3; slot++) look.live |= search->near_used[slot];
     for (uint32_t y = 0; y < gradient->height_px; y += BAND_PX) {
         look.first_y = y;
-        if (look_band(search, &look)) look_cluster(search, &look);
+        const uint32_t first = search->n_places;
+        if (!look_band(search, &look)) continue;
+        look_cluster(search, &look);
+        look_spread(search, first);
     }
 }
 

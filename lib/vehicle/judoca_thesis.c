@@ -49,6 +49,12 @@ typedef struct oc_judoca_thesis {
     uint32_t *place;    /* [max_candidates] index into prescore of a place to report */
 } oc_judoca_thesis_t;
 
+/* Every place that fits the answer is reported: there is no fit whose time to bound. */
+static uint32_t thesis_limit(const oc_judoca_params_t *params)
+{
+    return params->max_candidates > 0 ? params->max_candidates : OC_JUDOCA_MAX_FOUND;
+}
+
 static size_t thesis_area(uint32_t width_px, uint32_t height_px, const oc_judoca_params_t *params)
 {
     const size_t border = (size_t)params->lambda_px + 3u;
@@ -59,7 +65,7 @@ size_t oc_judoca_thesis_size_bytes(uint32_t width_px, uint32_t height_px, const 
 {
     const size_t area = thesis_area(width_px, height_px, params);
     return oc_arena_cost(sizeof(oc_judoca_thesis_t)) + oc_arena_cost(area) + oc_arena_cost(area * sizeof(uint16_t)) +
-           oc_arena_cost(params->max_candidates * sizeof(uint32_t));
+           oc_arena_cost(thesis_limit(params) * sizeof(uint32_t));
 }
 
 /* ---- tables ---- */
@@ -108,7 +114,7 @@ oc_status_t oc_judoca_thesis_init(oc_judoca_ws_t *ws, oc_arena_t *arena)
     const uint32_t width = ws->gradient.width_px, height = ws->gradient.height_px;
     const size_t area = thesis_area(width, height, params);
     const size_t bytes[4] = {sizeof(oc_judoca_thesis_t), area, area * sizeof(uint16_t),
-                             params->max_candidates * sizeof(uint32_t)};
+                             thesis_limit(params) * sizeof(uint32_t)};
     void *piece[4];
     for (uint32_t i = 0; i < 4; i++) {
         const oc_status_t status = oc_arena_take(arena, bytes[i], &piece[i]);
@@ -291,8 +297,8 @@ static void thesis_pick(oc_judoca_ws_t *ws, int32_t radius)
      * the choice does not depend on where in the image a place lies. */
     uint32_t bin = SUM_BINS;
     uint32_t n = 0;
-    while (bin > 0 && n + histogram[bin - 1] <= ws->params.max_candidates) n += histogram[--bin];
-    ws->stats.n_fitted = place_scan(ws, radius, NULL, bin, ws->params.max_candidates);
+    while (bin > 0 && n + histogram[bin - 1] <= thesis_limit(&ws->params)) n += histogram[--bin];
+    ws->stats.n_fitted = place_scan(ws, radius, NULL, bin, thesis_limit(&ws->params));
 }
 
 void oc_judoca_thesis_find(oc_judoca_ws_t *ws)
