@@ -42,6 +42,8 @@
 /* The furthest pixel that a look round the apex takes in, and what counts as a branch that is there already. */
 #define RING_REACH 11
 #define RING_SAME_COS 0.9f
+#define RING_HIDDEN_COS 0.6f
+#define RING_CONTRAST 0.9f
 
 /* With the rivals taken off, positions from here on count. */
 #define MODEL_INNER_PX 1.5f
@@ -335,33 +337,36 @@ static bool ring_measure(const oc_gradient_t *gradient, const oc_fit_t *fit, flo
     return true;
 }
 
-static bool fit_has_branch(const oc_fit_t *fit, const oc_fit_branch_t *made)
+/* Is a direction new? One further out is only when it is near to a branch's, whose ridge hid it near the apex. */
+static bool fit_lacks(const oc_fit_t *fit, const oc_fit_branch_t *made, bool is_far)
 {
+    float nearest = -1.0f;
     for (uint32_t i = 0; i < fit->n; i++) {
-        if (fit->branch[i].side == made->side && fit_cos_between(&fit->branch[i], made) > RING_SAME_COS) return true;
+        const float cosine = fit_cos_between(&fit->branch[i], made);
+        if (fit->branch[i].side == made->side && cosine > RING_SAME_COS) return false;
+        nearest = larger(nearest, cosine);
     }
-    return false;
+    return !is_far || nearest > RING_HIDDEN_COS;
 }
 
 /* Seen from where the apex turned out to be, edges may run in directions that
  * the place, a pixel or two aside, did not show: those are added. */
-static void fit_look_round(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_ring_table_t *table,
-                           oc_fit_t *fit)
+static void fit_look_round(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, bool is_far, oc_fit_t *fit)
 {
     float ring[OC_RAYS];
     const float t_b = rules->t_b * (float)OC_GRADIENT_ONE;
-    if (!ring_measure(gradient, fit, 0.4f * t_b, table, ring)) return;
+    if (!ring_measure(gradient, fit, 0.4f * t_b, &rules->ring[is_far], ring)) return;
     for (uint32_t d = 0; d < OC_RAYS && fit->n < OC_FIT_MAX_BRANCHES; d++) {
         const float side = ring[d] > 0.0f ? 1.0f : -1.0f, here = side * ring[d];
         const float before = side * ring[(d + OC_RAYS - 1u) % OC_RAYS], after = side * ring[(d + 1u) % OC_RAYS];
-        if (!(here >= 0.7f * t_b && here > before && here >= after)) continue;
+        if (!(here >= RING_CONTRAST * t_b && here > before && here >= after)) continue;
         oc_fit_branch_t made;
         memset(&made, 0, sizeof made);
-        made.ux = table->ux[d];
-        made.uy = table->uy[d];
+        made.ux = rules->ring[0].ux[d];
+        made.uy = rules->ring[0].uy[d];
         made.side = side;
         made.amplitude = here;
-        if (!fit_has_branch(fit, &made)) fit->branch[fit->n++] = made;
+        if (fit_lacks(fit, &made, is_far)) fit->branch[fit->n++] = made;
     }
 }
 
@@ -430,7 +435,7 @@ bool oc_judoca_fit_finish(const oc_gradient_t *gradient, const oc_fit_rules_t *r
 
     float moved_px = 1.0f, length_px = FIRST_LOOK_PX;
     for (uint32_t pass = 0; pass < PASSES; pass++) {
-        if (pass < 2) fit_look_round(gradient, rules, &rules->ring[pass], fit);
+        if (pass < 2) fit_look_round(gradient, rules, pass == 1, fit);
         const bool is_whole = length_px >= rules->lambda_px;
         length_px = smaller(GROWTH * length_px, rules->lambda_px);
         const int32_t across_px = pass == 0  ? (fit->moved_px > AGAIN_PX || fit->sigma_px > VAGUE_PX ? 2 : 1)
