@@ -48,6 +48,8 @@ static oc_fit_walk_t walk_make(const oc_gradient_t *gradient, const oc_fit_rules
         .own_minor = flat ? uy : ux,
         .floor = LEAST_DERIVATIVE * rules->t_b * (float)OC_GRADIENT_ONE,
         .has_model = span->has_model,
+        .crowded_px = span->crowded_px,
+        .shortest_px = span->shortest_px,
         .reach = span->across_px,
     };
     const float from = walk.a_major + span->inner_px * major, to = walk.a_major + span->longest_px * major;
@@ -82,40 +84,16 @@ static uint32_t rivals_make(const oc_fit_t *fit, uint32_t self, float blur_px,
     return n;
 }
 
-/* The positions that count, outwards, and how many samples were edges of those looked at so far. */
-typedef struct fit_picks {
-    uint32_t n;
-    uint8_t at[OC_FIT_SAMPLES], n_edges[OC_FIT_SAMPLES], n_tried[OC_FIT_SAMPLES];
-} fit_picks_t;
-
-/* All positions up to the shortest length, then as far as no two in a row are missing. */
-static void picks_collect(const oc_fit_profile_t *profile, uint32_t n_samples, const oc_fit_span_t *span,
-                          fit_picks_t *picks)
+static uint32_t last_of(uint32_t places)
 {
-    uint32_t missing = 0, n_edges = 0, n_tried = 0;
-    picks->n = 0;
-    for (uint32_t m = 0; m < n_samples; m++) {
-        const int32_t found = profile->found[m];
-        const bool is_free = profile->t[m] >= span->crowded_px;
-        n_tried += found == 2 || is_free;
-        if (found == 0 || (found == 1 && !is_free)) {
-            if (++missing >= 2 && profile->t[m] > span->shortest_px) return;
-            continue;
-        }
-        n_edges++;
-        missing = 0;
-        if (found != 2) continue;
-        picks->at[picks->n] = (uint8_t)m;
-        picks->n_edges[picks->n] = (uint8_t)n_edges;
-        picks->n_tried[picks->n++] = (uint8_t)n_tried;
-    }
+    return 31u - (uint32_t)__builtin_clz(places);
 }
 
-/* The branch's own line through its first n positions; false when they do not make one. */
+/* The branch's own line through some of its positions; false when they do not make one. */
 static bool branch_solve(const oc_kernels_t *kernels, oc_fit_branch_t *branch, const oc_fit_profile_t *profile,
-                         const fit_picks_t *picks, uint32_t n)
+                         uint32_t places, uint32_t n)
 {
-    kernels->sums(profile, picks->at[n - 1] + 1u, FAR_PX, &branch->sums);
+    kernels->sums(profile, places, FAR_PX, &branch->sums);
     const oc_fit_sums_t *s = &branch->sums;
     const float det = s->w * s->wtt - s->wt * s->wt;
     if (!(det > 1e-3f * s->w * s->w)) return false;
@@ -126,8 +104,9 @@ static bool branch_solve(const oc_kernels_t *kernels, oc_fit_branch_t *branch, c
     const float spare = n > 2 ? (float)(n - 2u) : 1.0f;
     branch->rms_px = sse > 0.0f ? sqrtf(sse / s->w * (float)n / spare) : 0.0f;
     branch->amplitude = s->value / s->w;
-    branch->share = (float)picks->n_edges[n - 1] / (float)picks->n_tried[n - 1];
-    branch->length_px = profile->t[picks->at[n - 1]];
+    const uint32_t last = last_of(places), upto = UINT32_MAX >> (31u - last);
+    branch->share = (float)__builtin_popcount(profile->edge & upto) / (float)__builtin_popcount(profile->tried & upto);
+    branch->length_px = profile->t[last];
     branch->n = (float)n;
     return true;
 }
@@ -145,17 +124,14 @@ bool oc_judoca_branch_follow(const oc_gradient_t *gradient, const oc_fit_rules_t
     gradient->kernels->profile(&walk, rivals, span->has_model ? rivals_make(fit, i, blur_px, rivals) : 0,
                                fit->blur_px2 / (walk.own_major * walk.own_major), inv_s, inv_st, &profile);
 
-    fit_picks_t picks;
-    picks_collect(&profile, walk.n, span, &picks);
-    uint32_t n_short = 0;
-    while (n_short < picks.n && profile.t[picks.at[n_short]] <= span->shortest_px + 0.5f) n_short++;
-    if (n_short < MIN_SAMPLES) n_short = MIN_SAMPLES;
-
+    const uint32_t n_short = profile.n_short < MIN_SAMPLES ? MIN_SAMPLES : profile.n_short;
     const float tolerant_px = LEAST_LENGTH * span->asked_px, strict_px = span->asked_px - 1.5f;
-    for (uint32_t n = picks.n; n >= n_short; n = n > n_short + 2 ? (n + n_short) / 2 : n - 1) {
-        const float last_px = profile.t[picks.at[n - 1]];
+    uint32_t places = profile.place, left = profile.n;
+    for (uint32_t n = left; n >= n_short; n = n > n_short + 2 ? (n + n_short) / 2 : n - 1) {
+        for (; left > n; left--) places &= ~(1u << last_of(places));
+        const float last_px = profile.t[last_of(places)];
         if (last_px < strict_px && last_px < tolerant_px) return false;
-        if (!branch_solve(gradient->kernels, branch, &profile, &picks, n)) return false;
+        if (!branch_solve(gradient->kernels, branch, &profile, places, n)) return false;
         const float limit = n > n_short ? GROW_RMS_PX : rules->max_rms_px;
         if (branch->rms_px <= limit && branch->share >= rules->s_j) {
             return branch->amplitude >= LEAST_CONTRAST * rules->t_b * (float)OC_GRADIENT_ONE;

@@ -62,6 +62,8 @@ typedef struct oc_fit_walk {
     float own_major, own_minor;     /* unit vector along the branch */
     bool has_model;                 /* branches end at the apex: level the ridge */
     float floor;                    /* least derivative of an edge point */
+    float crowded_px;               /* nearer than this another ridge may hide a sample */
+    float shortest_px;              /* up to here missing samples end nothing */
     int32_t reach;                  /* half width of the search across, 0..OC_FIT_MAX_REACH */
 } oc_fit_walk_t;
 
@@ -79,7 +81,11 @@ typedef struct oc_fit_profile {
     float gain[OC_FIT_SAMPLES];    /* share of the full ridge this near to the apex */
     float value[OC_FIT_SAMPLES];   /* derivative at the ridge */
     float bend[OC_FIT_SAMPLES];    /* 2 value - before - after */
-    int32_t found[OC_FIT_SAMPLES]; /* 0 no edge, 1 an edge that does not say where, 2 a position */
+    /* Bit m = sample m. */
+    uint32_t place;      /* positions: edges that say where, before two missing in a row end the branch */
+    uint32_t edge;       /* all edges, those that do not say where only where no ridge hides them */
+    uint32_t tried;      /* positions and samples that no ridge hides */
+    uint32_t n, n_short; /* positions; those up to half a pixel beyond the shortest length */
 } oc_fit_profile_t;
 
 /* Weighted sums over the ridge positions of one branch, in its own frame at
@@ -128,8 +134,8 @@ typedef struct oc_kernels {
      * mean's sign. apex points to the pair of the apex' pixel, width is the planes' pitch in pixels. */
     void (*ring)(const oc_ring_table_t *table, const int16_t *apex, int32_t width, float floor, float ring[OC_RAYS]);
 
-    /* Sums over the positions before sample end; those from far_px on tell the blur. */
-    void (*sums)(const oc_fit_profile_t *profile, uint32_t end, float far_px, oc_fit_sums_t *sums);
+    /* Sums over positions, bit m = sample m; those from far_px on tell the blur. */
+    void (*sums)(const oc_fit_profile_t *profile, uint32_t places, float far_px, oc_fit_sums_t *sums);
 
     /* Ridge positions along a branch, what the rivals add taken off. s2 is the
      * square of the ridge's Gaussian width along the minor axis, px; inv_s one

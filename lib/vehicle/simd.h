@@ -4,6 +4,7 @@
 #define OUTCROP_VEHICLE_SIMD_H
 
 #include <stdint.h>
+#include <string.h>
 
 #if defined(OC_KERNELS_SCALAR)
 /* The twin uses none. */
@@ -16,6 +17,57 @@
 /* Four bitmap words: 64 pixels of four rows. GCC and clang turn the operators
  * into whatever the target has. */
 typedef uint64_t oc_words_t __attribute__((vector_size(32)));
+
+/* Eight samples, four bytes each; comparisons give 0 or -1. */
+#define OC_LANES 8u
+typedef float oc_lanes_t __attribute__((vector_size(4 * OC_LANES)));
+typedef int32_t oc_ints_t __attribute__((vector_size(4 * OC_LANES)));
+typedef uint32_t oc_uints_t __attribute__((vector_size(4 * OC_LANES)));
+
+/* Where mask is -1 a, where it is 0 b. */
+static inline oc_lanes_t oc_lanes_select(oc_ints_t mask, oc_lanes_t a, oc_lanes_t b)
+{
+#if defined(__AVX2__) && !defined(OC_KERNELS_SCALAR)
+    return (oc_lanes_t)_mm256_blendv_ps((__m256)b, (__m256)a, (__m256)mask);
+#else
+    return (oc_lanes_t)((mask & (oc_ints_t)a) | (~mask & (oc_ints_t)b));
+#endif
+}
+
+/* a < b ? a : b, and a > b ? a : b. */
+static inline oc_lanes_t oc_lanes_min(oc_lanes_t a, oc_lanes_t b)
+{
+#if defined(__AVX2__) && !defined(OC_KERNELS_SCALAR)
+    return (oc_lanes_t)_mm256_min_ps((__m256)a, (__m256)b);
+#else
+    return oc_lanes_select(a < b, a, b);
+#endif
+}
+
+static inline oc_lanes_t oc_lanes_max(oc_lanes_t a, oc_lanes_t b)
+{
+#if defined(__AVX2__) && !defined(OC_KERNELS_SCALAR)
+    return (oc_lanes_t)_mm256_max_ps((__m256)a, (__m256)b);
+#else
+    return oc_lanes_select(a > b, a, b);
+#endif
+}
+
+/* Bit i = mask[i] is not zero. */
+static inline uint32_t oc_bits_of_lanes(oc_ints_t mask)
+{
+#if defined(__AVX2__) && !defined(OC_KERNELS_SCALAR)
+    return (uint32_t)_mm256_movemask_ps((__m256)mask);
+#elif defined(__SSE2__) && !defined(OC_KERNELS_SCALAR)
+    __m128 half[2];
+    memcpy(half, &mask, sizeof half);
+    return (uint32_t)_mm_movemask_ps(half[0]) | (uint32_t)_mm_movemask_ps(half[1]) << 4;
+#else
+    static const oc_ints_t weight = {1, 2, 4, 8, 16, 32, 64, 128};
+    const oc_ints_t bits = mask & weight;
+    return (uint32_t)(((bits[0] | bits[4]) | (bits[2] | bits[6])) | ((bits[1] | bits[5]) | (bits[3] | bits[7])));
+#endif
+}
 
 static inline int oc_words_any(const oc_words_t *w)
 {
