@@ -75,7 +75,7 @@ typedef struct oc_fit_span {
  * apex; the longest piece that stays straight wins. branch: in, direction and
  * side; out, the rest. False, and branch of no use, when it does not hold. */
 bool oc_judoca_branch_follow(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit,
-                             uint32_t i, const oc_fit_span_t *span, oc_fit_branch_t *branch);
+                             const oc_fit_blur_t *blur, uint32_t i, const oc_fit_span_t *span, oc_fit_branch_t *branch);
 
 #ifdef __cplusplus
 }

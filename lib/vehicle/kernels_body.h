@@ -304,33 +304,6 @@ static void kernel_rays(const oc_ray_table_t *table, const uint64_t *const left[
 
 #endif
 
-/* ---- round the apex ---- */
-
-static void kernel_ring(const oc_ring_table_t *table, const int16_t *apex, int32_t width, float floor,
-                        float ring[OC_RAYS])
-{
-    float gx[OC_RING_SAMPLES][OC_RAYS], gy[OC_RING_SAMPLES][OC_RAYS];
-    for (uint32_t s = 0; s < OC_RING_SAMPLES; s++) {
-        for (uint32_t d = 0; d < OC_RAYS; d++) {
-            const int16_t *at = apex + 2 * (table->dy[s][d] * width + table->dx[s][d]);
-            gx[s][d] = at[0];
-            gy[s][d] = at[1];
-        }
-    }
-    for (uint32_t d = 0; d < OC_RAYS; d++) {
-        float sum = 0.0f;
-        int32_t n_front = 0, n_back = 0;
-        for (uint32_t s = 0; s < OC_RING_SAMPLES; s++) {
-            const float v = table->ux[d] * gy[s][d] - table->uy[d] * gx[s][d];
-            sum += v;
-            n_front += (int32_t)(v > floor);
-            n_back += (int32_t)(v < -floor);
-        }
-        const int32_t n_steady = sum > 0.0f ? n_front : n_back;
-        ring[d] = n_steady >= (int32_t)OC_RING_SAMPLES - 1 ? sum * (1.0f / OC_RING_SAMPLES) : 0.0f;
-    }
-}
-
 const oc_kernels_t OC_KERNELS_TABLE = {
     .level = OC_KERNELS_LEVEL,
     .down = kernel_down,
@@ -340,7 +313,7 @@ const oc_kernels_t OC_KERNELS_TABLE = {
     .spread = kernel_spread,
     .rays = kernel_rays,
     .ring = kernel_ring,
-    .profile = kernel_profile,
+    .follow = kernel_follow,
     .sums = kernel_sums,
 };
 

@@ -146,7 +146,7 @@ KERNEL_INLINE void ridge_take(const oc_fit_walk_t *walk, int32_t m, kernel_ridge
     const oc_ints_t order = kLaneOrder + m, past = order > last;
     const oc_ints_t major = walk->first + walk->sign * ((past & last) | (~past & order));
     const oc_lanes_t from_apex = __builtin_convertvector(major, oc_lanes_t) - walk->a_major;
-    const oc_lanes_t expected = walk->a_minor + from_apex * walk->slope;
+    const oc_lanes_t expected = walk->a_minor + from_apex * (walk->own_minor * walk->per_major);
     /* Away from the image by less than the shift, so the cut is a floor. */
     const oc_ints_t nearest = __builtin_convertvector(expected + 64.5f, oc_ints_t) - 64;
     const int32_t highest = walk->n_minor - 1 - half;
@@ -166,26 +166,14 @@ KERNEL_INLINE void ridge_take(const oc_fit_walk_t *walk, int32_t m, kernel_ridge
     ridge_find(walk, from, ridge, reach);
 }
 
-/* Number of samples up to a distance from the apex. */
-KERNEL_INLINE int32_t samples_until(const oc_fit_walk_t *walk, float reach_px)
-{
-    const float major = walk->own_major < 0.0f ? -walk->own_major : walk->own_major;
-    const float first = ((float)walk->first - walk->a_major) * (float)walk->sign;
-    const float n = reach_px * major - first + 1.0f;
-    return n < (float)OC_FIT_SAMPLES ? (int32_t)n : (int32_t)OC_FIT_SAMPLES;
-}
-
 /* Take off what a rival branch adds to the three taps. */
-KERNEL_INLINE void ridge_clear(const oc_fit_walk_t *walk, const oc_fit_rival_t *rival, float inv_s, float inv_st,
-                               kernel_ridge_t *ridge)
+KERNEL_INLINE void ridge_clear(const oc_fit_rival_t *rival, const oc_fit_blur_t *blur, kernel_ridge_t *ridge)
 {
-    const bool flat = walk->is_flat;
-    const float u_major = flat ? rival->ux : rival->uy, u_minor = flat ? rival->uy : rival->ux;
     const float amplitude = rival->amplitude;
+    const float t_major = rival->u_major * blur->inv_st, dt = rival->u_minor * blur->inv_st;
+    const float d_major = rival->u_minor * blur->inv_s, dd = rival->u_major * blur->inv_s;
     const oc_lanes_t minor = ridge->centre + ridge->offset;
-    const oc_lanes_t t = (ridge->major * u_major + minor * u_minor) * inv_st;
-    const oc_lanes_t d = (minor * u_major - ridge->major * u_minor) * inv_s;
-    const float dt = u_minor * inv_st, dd = u_major * inv_s;
+    const oc_lanes_t t = ridge->major * t_major + minor * dt, d = minor * dd - ridge->major * d_major;
     ridge->before -= amplitude * lanes_bell(d - dd) * lanes_step(t - dt);
     ridge->middle -= amplitude * lanes_bell(d) * lanes_step(t);
     ridge->after -= amplitude * lanes_bell(d + dd) * lanes_step(t + dt);
@@ -193,9 +181,9 @@ KERNEL_INLINE void ridge_clear(const oc_fit_walk_t *walk, const oc_fit_rival_t *
 
 /* The branch's own ridge rises along the branch; a profile that is not square
  * to it sees that as slope. */
-KERNEL_INLINE void ridge_level(const oc_fit_walk_t *walk, float inv_st, kernel_ridge_t *ridge)
+KERNEL_INLINE void ridge_level(const oc_fit_walk_t *walk, const oc_fit_blur_t *blur, kernel_ridge_t *ridge)
 {
-    const float u_major = walk->own_major * inv_st, u_minor = walk->own_minor * inv_st;
+    const float u_major = walk->own_major * blur->inv_st, u_minor = walk->own_minor * blur->inv_st;
     const oc_lanes_t minor = ridge->centre + ridge->offset;
     const oc_lanes_t t = ridge->major * u_major + minor * u_minor;
     const oc_lanes_t here = lanes_step(t);
@@ -213,23 +201,21 @@ typedef struct kernel_marks {
 } kernel_marks_t;
 
 /* Vertex of the parabola through the three taps, put right for a Gaussian. */
-KERNEL_INLINE void ridge_peak(const oc_fit_walk_t *walk, const kernel_ridge_t *ridge, float s2, float inv_st,
+KERNEL_INLINE void ridge_peak(const oc_fit_walk_t *walk, const kernel_ridge_t *ridge, const oc_fit_blur_t *blur,
                               const float most, int32_t m, oc_fit_profile_t *out, kernel_marks_t *marks)
 {
-    /* The minor axis on the normal and along the branch. */
-    const float to_d = walk->is_flat ? walk->own_major : -walk->own_major, to_t = walk->own_minor;
-    const float per_major = 1.0f / walk->own_major;
-    const float gain = 0.25f / s2 + (1.0f / 24.0f) / (s2 * s2);
+    const float inv_s2 = walk->own_major * walk->own_major * blur->inv_s2; /* along the minor axis */
+    const float gain = inv_s2 * (0.25f + (1.0f / 24.0f) * inv_s2);
     const oc_lanes_t middle = ridge->middle;
     const oc_lanes_t bend = 2.0f * middle - ridge->before - ridge->after, slope = ridge->after - ridge->before;
     const oc_ints_t is_bent = bend > 0.0f;
     const oc_lanes_t p = 0.5f * slope / oc_lanes_select(is_bent, bend, lanes_all(1.0f));
     const oc_lanes_t near = lanes_within(p, -0.5f, 0.5f);
     const oc_lanes_t across = ridge->offset + p + gain * near * (1.0f - 4.0f * near * near) - ridge->expected;
-    const oc_lanes_t t = ridge->major * per_major + across * to_t;
+    const oc_lanes_t t = ridge->major * walk->per_major + across * walk->own_minor;
     lanes_store(out->t + m, t);
-    lanes_store(out->d + m, across * to_d);
-    lanes_store(out->gain + m, lanes_step(t * inv_st));
+    lanes_store(out->d + m, across * walk->to_d);
+    lanes_store(out->gain + m, lanes_step(t * blur->inv_st));
     lanes_store(out->value + m, middle);
     lanes_store(out->bend + m, bend);
     const oc_ints_t is_edge = (middle > walk->floor) & (lanes_size(ridge->along) <= 0.62f * middle) & ridge->is_inside;
@@ -251,22 +237,24 @@ KERNEL_INLINE void profile_pick(const oc_fit_walk_t *walk, const kernel_marks_t 
     out->edge = seen;
     out->tried = marks->placed | marks->is_free;
     const uint32_t far = out->place & ~marks->near;
-    out->n = (uint32_t)__builtin_popcount(out->place);
     out->n_short = (uint32_t)__builtin_popcount(out->place & ((far & (0u - far)) - 1u));
 }
 
 /* ---- sums ---- */
 
-/* Lanes are summed apart and added up in one fixed order. */
-KERNEL_INLINE float lanes_sum(oc_lanes_t v)
+/* Lanes are summed apart and added up in one fixed order, four sums at a time. */
+KERNEL_INLINE oc_quad_t lanes_sums(oc_lanes_t a, oc_lanes_t b, oc_lanes_t c, oc_lanes_t d)
 {
-    return ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7]));
+    const oc_quad_t a4 = oc_lanes_fold(a), b4 = oc_lanes_fold(b), c4 = oc_lanes_fold(c), d4 = oc_lanes_fold(d);
+    const oc_quad_t ab = __builtin_shufflevector(a4, b4, 0, 1, 4, 5) + __builtin_shufflevector(a4, b4, 2, 3, 6, 7);
+    const oc_quad_t cd = __builtin_shufflevector(c4, d4, 0, 1, 4, 5) + __builtin_shufflevector(c4, d4, 2, 3, 6, 7);
+    return __builtin_shufflevector(ab, cd, 0, 2, 4, 6) + __builtin_shufflevector(ab, cd, 1, 3, 5, 7);
 }
 
-static void kernel_sums(const oc_fit_profile_t *p, uint32_t places, float far_px, oc_fit_sums_t *sums)
+KERNEL_INLINE void sums_take(const oc_fit_profile_t *p, uint32_t places, float far_px, oc_fit_sums_t *sums)
 {
     oc_lanes_t w = {0}, wt = w, wtt = w, wd = w, wtd = w, wdd = w, value = w, bend = w, level = w;
-    for (uint32_t m = 0; places >> m != 0; m += OC_LANES) {
+    for (uint32_t m = 0; m < OC_FIT_SAMPLES && places >> m != 0; m += OC_LANES) {
         const oc_ints_t counts = ((int32_t)(places >> m & 0xffu) & kLaneBit) != 0;
         const oc_lanes_t t = lanes_where(counts, lanes_load(p->t + m)), d = lanes_where(counts, lanes_load(p->d + m));
         const oc_lanes_t gain = lanes_where(counts, lanes_load(p->gain + m));
@@ -282,39 +270,95 @@ static void kernel_sums(const oc_fit_profile_t *p, uint32_t places, float far_px
         value += v * gain;
         bend += lanes_where(is_far, lanes_load(p->bend + m));
         level += lanes_where(is_far, v);
-        if (m + OC_LANES >= OC_FIT_SAMPLES) break;
     }
-    *sums = (oc_fit_sums_t){lanes_sum(w),   lanes_sum(wt),    lanes_sum(wtt),  lanes_sum(wd),   lanes_sum(wtd),
-                            lanes_sum(wdd), lanes_sum(value), lanes_sum(bend), lanes_sum(level)};
+    const oc_quad_t first = lanes_sums(w, wt, wtt, wd), second = lanes_sums(wtd, wdd, value, bend);
+    memcpy(&sums->w, &first, sizeof first);
+    memcpy(&sums->wtd, &second, sizeof second);
+    sums->level = lanes_sums(level, level, level, level)[0];
+    const uint32_t last = 31u - (uint32_t)__builtin_clz(places | 1u), upto = UINT32_MAX >> (31u - last);
+    const float tried = (float)__builtin_popcount(p->tried & upto);
+    sums->n = (uint32_t)__builtin_popcount(places);
+    sums->share = (float)__builtin_popcount(p->edge & upto) / (tried > 0.0f ? tried : 1.0f);
+    sums->last_px = p->t[last];
 }
 
-KERNEL_INLINE void profile_reach(const oc_fit_walk_t *walk, const oc_fit_rival_t rivals[], uint32_t n_rivals, float s2,
-                                 float inv_s, float inv_st, oc_fit_profile_t *out, const int32_t reach)
+static void kernel_sums(const oc_fit_profile_t *profile, uint32_t places, float far_px, oc_fit_sums_t *sums)
+{
+    sums_take(profile, places, far_px, sums);
+}
+
+/* ---- a branch ---- */
+
+KERNEL_INLINE void follow_reach(const oc_fit_walk_t *walk, const oc_fit_rival_t rivals[], uint32_t n_rivals,
+                                const oc_fit_blur_t *blur, oc_fit_profile_t *out, oc_fit_sums_t *sums,
+                                const int32_t reach)
 {
     kernel_marks_t marks = {0};
     const int32_t n = (int32_t)walk->n;
-    const int32_t n_level = walk->has_model ? samples_until(walk, 3.0f / inv_st + 1.0f) : 0;
     for (int32_t m = 0; m < n; m += LANES) {
+        const float from_px = ((float)(walk->first + walk->sign * m) - walk->a_major) * walk->per_major;
         kernel_ridge_t ridge;
         ridge_take(walk, m, &ridge, reach);
         for (uint32_t j = 0; j < n_rivals; j++) {
-            if (samples_until(walk, rivals[j].reach_px) > m) ridge_clear(walk, &rivals[j], inv_s, inv_st, &ridge);
+            if (from_px * rivals[j].apart < OC_FIT_RIVAL_WIDTHS * blur->s) ridge_clear(&rivals[j], blur, &ridge);
         }
-        if (n_level > m) ridge_level(walk, inv_st, &ridge);
+        if (walk->has_model && from_px < 3.0f * blur->st + 1.0f) ridge_level(walk, blur, &ridge);
         /* Without a search the ridge may be nearer to the next pixel. */
-        ridge_peak(walk, &ridge, s2, inv_st, reach == 0 ? 1.0f : 0.51f, m, out, &marks);
+        ridge_peak(walk, &ridge, blur, reach == 0 ? 1.0f : 0.51f, m, out, &marks);
     }
     profile_pick(walk, &marks, out);
+    sums_take(out, out->place, walk->far_px, sums);
 }
 
-static void kernel_profile(const oc_fit_walk_t *walk, const oc_fit_rival_t rivals[], uint32_t n_rivals, float s2,
-                           float inv_s, float inv_st, oc_fit_profile_t *out)
+static void kernel_follow(const oc_fit_walk_t *walk, const oc_fit_rival_t rivals[], uint32_t n_rivals,
+                          const oc_fit_blur_t *blur, oc_fit_profile_t *out, oc_fit_sums_t *sums)
 {
     switch (walk->reach) {
-    case 0: profile_reach(walk, rivals, n_rivals, s2, inv_s, inv_st, out, 0); break;
-    case 1: profile_reach(walk, rivals, n_rivals, s2, inv_s, inv_st, out, 1); break;
-    default: profile_reach(walk, rivals, n_rivals, s2, inv_s, inv_st, out, 2); break;
+    case 0: follow_reach(walk, rivals, n_rivals, blur, out, sums, 0); break;
+    case 1: follow_reach(walk, rivals, n_rivals, blur, out, sums, 1); break;
+    default: follow_reach(walk, rivals, n_rivals, blur, out, sums, 2); break;
     }
+}
+
+/* ---- round the apex ---- */
+
+/* Eight directions of a ring. */
+KERNEL_INLINE oc_lanes_t ring_take(const oc_ring_table_t *table, const int16_t *apex, float floor, uint32_t d)
+{
+    const oc_lanes_t ux = lanes_load(table->ux + d), uy = lanes_load(table->uy + d);
+    oc_lanes_t sum = {0};
+    oc_ints_t n_front = {0}, n_back = {0};
+    for (uint32_t s = 0; s < OC_RING_SAMPLES; s++) {
+        const int16_t *from[LANES];
+        for (uint32_t i = 0; i < OC_LANES; i++) from[i] = apex + 2 * (ptrdiff_t)table->at[s][d + i];
+        const oc_ints_t pair = pairs_take(from, 0);
+        const oc_lanes_t v = ux * pairs_dy(pair) - uy * pairs_dx(pair);
+        sum += v;
+        n_front -= v > floor;
+        n_back -= v < -floor;
+    }
+    const oc_ints_t is_front = sum > 0.0f;
+    const oc_ints_t n_steady = (is_front & n_front) | (~is_front & n_back);
+    return lanes_where(n_steady >= (int32_t)OC_RING_SAMPLES - 1, sum * (1.0f / OC_RING_SAMPLES));
+}
+
+static uint32_t kernel_ring(const oc_ring_table_t *table, const int16_t *apex, float floor, float contrast,
+                            float ring[OC_RAYS])
+{
+    float closed[OC_RAYS + 2u]; /* one direction more at either end */
+    for (uint32_t d = 0; d < OC_RAYS; d += OC_LANES) lanes_store(closed + 1 + d, ring_take(table, apex, floor, d));
+    closed[0] = closed[OC_RAYS];
+    closed[OC_RAYS + 1u] = closed[1];
+    memcpy(ring, closed + 1, OC_RAYS * sizeof ring[0]);
+    uint32_t greatest = 0;
+    for (uint32_t d = 0; d < OC_RAYS; d += OC_LANES) {
+        const oc_lanes_t mean = lanes_load(closed + 1 + d), here = lanes_size(mean);
+        const oc_ints_t side = (oc_ints_t)mean & INT32_MIN;
+        const oc_lanes_t before = (oc_lanes_t)(side ^ (oc_ints_t)lanes_load(closed + d));
+        const oc_lanes_t after = (oc_lanes_t)(side ^ (oc_ints_t)lanes_load(closed + 2 + d));
+        greatest |= oc_bits_of_lanes((here >= contrast) & (here > before) & (here >= after)) << d;
+    }
+    return greatest;
 }
 
 #endif

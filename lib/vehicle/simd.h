@@ -53,6 +53,13 @@ static inline oc_lanes_t oc_lanes_max(oc_lanes_t a, oc_lanes_t b)
 #endif
 }
 
+/* The two halves added. */
+typedef float oc_quad_t __attribute__((vector_size(16)));
+static inline oc_quad_t oc_lanes_fold(oc_lanes_t v)
+{
+    return __builtin_shufflevector(v, v, 0, 1, 2, 3) + __builtin_shufflevector(v, v, 4, 5, 6, 7);
+}
+
 /* Bit i = mask[i] is not zero. */
 static inline uint32_t oc_bits_of_lanes(oc_ints_t mask)
 {
