@@ -28,6 +28,12 @@ static inline int32_t ceiling(float x)
     return towards_zero + (int32_t)(x > (float)towards_zero);
 }
 
+/* Nearest integer of a number above -2^15. */
+static inline int32_t nearest(float x)
+{
+    return (int32_t)(x + 32768.5f) - 32768;
+}
+
 static inline int32_t least(int32_t a, int32_t b)
 {
     return a < b ? a : b;
@@ -50,53 +56,41 @@ static void walk_place(const oc_gradient_t *gradient, const oc_fit_t *fit, const
     walk->step_major = step[axis];
     walk->step_minor = step[axis ^ 1u];
     walk->n_minor = size[axis ^ 1u];
-    walk->sign = walk->own_major > 0.0f ? 1 : -1;
+    int32_t bits;
+    memcpy(&bits, &walk->own_major, sizeof bits);
+    walk->sign = bits >> 31 | 1;
 
     /* Seen along the branch coordinates rise. */
     const float along = (float)walk->sign, size_major = along * walk->own_major, from = along * walk->a_major;
     const int32_t first = ceiling(from + span->inner_px * size_major);
     const int32_t last = -ceiling(-(from + span->longest_px * size_major));
-    const int32_t last_inside = walk->sign > 0 ? size[axis] - 2 : -1, first_inside = walk->sign > 0 ? 1 : 2 - size[axis];
+    const int32_t backwards = walk->sign >> 31, span_inside = (1 - size[axis]) & backwards;
+    const int32_t first_inside = 1 + span_inside, last_inside = size[axis] - 2 + span_inside;
     const int32_t n = least(least(last, last_inside) - first + 1, (int32_t)OC_FIT_SAMPLES);
     walk->first = first * walk->sign;
     walk->n = (n > 0) & (first >= first_inside) ? (uint32_t)n : 0;
 }
 
 static oc_fit_walk_t walk_make(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit,
-                               const oc_fit_branch_t *branch, const oc_fit_span_t *span, uint32_t axis)
+                               uint32_t self, const oc_fit_branch_t *branch, const oc_fit_span_t *span)
 {
+    const float turn = branch->side * (float)(1 << 14);
+    const uint32_t axis = fabsf(branch->ux) < fabsf(branch->uy);
     oc_fit_walk_t walk = {
         .dxdy = gradient->dxdy,
-        .nx = -branch->uy * branch->side,
-        .ny = branch->ux * branch->side,
+        .nx = nearest(-branch->uy * turn),
+        .ny = nearest(branch->ux * turn),
         .floor = LEAST_DERIVATIVE * rules->t_b * (float)OC_GRADIENT_ONE,
         .crowded_px = span->crowded_px,
         .shortest_px = span->shortest_px,
         .far_px = FAR_PX,
         .has_model = span->has_model,
+        .self = self,
+        .axis = axis,
         .reach = span->across_px,
     };
     walk_place(gradient, fit, branch, span, axis, &walk);
     return walk;
-}
-
-/* What the other branches add to this one's derivative. */
-static uint32_t rivals_make(const oc_fit_t *fit, uint32_t self, uint32_t axis,
-                            oc_fit_rival_t rivals[OC_FIT_MAX_BRANCHES + 1])
-{
-    const oc_fit_branch_t *own = &fit->branch[self];
-    uint32_t n = 0;
-    for (uint32_t j = 0; j < fit->n; j++) {
-        const oc_fit_branch_t *other = &fit->branch[j];
-        const float u[2] = {other->ux, other->uy};
-        const float cosine = own->ux * other->ux + own->uy * other->uy;
-        const float sine = fabsf(own->ux * other->uy - own->uy * other->ux);
-        const float agree = own->side * other->side * cosine;
-        const float apart = sine > 0.1f ? sine : 0.1f;
-        rivals[n] = (oc_fit_rival_t){u[axis], u[axis ^ 1u], agree * other->amplitude, cosine > 0.0f ? apart : 1.0f};
-        n += (uint32_t)((j != self) & (fabsf(agree) >= 0.02f));
-    }
-    return n;
 }
 
 /* The branch's own line through the positions summed; false when they do not make one. */
@@ -148,16 +142,14 @@ static bool branch_shorten(const oc_kernels_t *kernels, const oc_fit_rules_t *ru
 }
 
 bool oc_judoca_branch_follow(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit,
-                             const oc_fit_blur_t *blur, uint32_t i, const oc_fit_span_t *span, oc_fit_branch_t *branch)
+                             const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur, uint32_t i,
+                             const oc_fit_span_t *span, oc_fit_branch_t *branch)
 {
-    const uint32_t axis = fabsf(branch->ux) < fabsf(branch->uy); /* the major one, 0 is x */
-    const oc_fit_walk_t walk = walk_make(gradient, rules, fit, branch, span, axis);
+    const oc_fit_walk_t walk = walk_make(gradient, rules, fit, i, branch, span);
     if (walk.n < MIN_SAMPLES) return false;
 
-    oc_fit_rival_t rivals[OC_FIT_MAX_BRANCHES + 1];
-    const uint32_t n_rivals = span->has_model ? rivals_make(fit, i, axis, rivals) : 0;
     oc_fit_profile_t profile;
-    gradient->kernels->follow(&walk, rivals, n_rivals, blur, &profile, &branch->sums);
+    gradient->kernels->follow(&walk, crowd, blur, &profile, &branch->sums);
 
     const uint32_t n_short = profile.n_short < MIN_SAMPLES ? MIN_SAMPLES : profile.n_short;
     const float tolerant_px = LEAST_LENGTH * span->asked_px, strict_px = span->asked_px - 1.5f;

@@ -12,9 +12,6 @@
 extern "C" {
 #endif
 
-/* Branches followed while fitting; the strongest OC_MAX_BRANCHES leave. */
-#define OC_FIT_MAX_BRANCHES 8u
-
 /* Where to look for one branch. */
 typedef struct oc_fit_seed {
     float ux, uy; /* unit vector along the branch, away from the apex */
@@ -75,7 +72,8 @@ typedef struct oc_fit_span {
  * apex; the longest piece that stays straight wins. branch: in, direction and
  * side; out, the rest. False, and branch of no use, when it does not hold. */
 bool oc_judoca_branch_follow(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit,
-                             const oc_fit_blur_t *blur, uint32_t i, const oc_fit_span_t *span, oc_fit_branch_t *branch);
+                             const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur, uint32_t i,
+                             const oc_fit_span_t *span, oc_fit_branch_t *branch);
 
 #ifdef __cplusplus
 }

@@ -205,34 +205,38 @@ static void fit_measure_blur(oc_fit_t *fit, float sigma_px)
     fit->blur_px2 = smaller(larger(sum / n, base + MIN_BLUR_PX2), base + MAX_BLUR_PX2);
 }
 
-/* Cotangent of the angle to the nearest other branch, of every branch; 0 without an acute angle. Returns the largest. */
-static float fit_acute_cots(const oc_fit_t *fit, float cot[OC_FIT_MAX_BRANCHES])
+static void fit_crowd(const oc_fit_t *fit, oc_fit_crowd_t *crowd)
 {
-    float largest = 0.0f;
+    memset(crowd, 0, sizeof *crowd);
     for (uint32_t i = 0; i < fit->n; i++) {
-        cot[i] = 0.0f;
-        for (uint32_t j = 0; j < i; j++) {
-            const float c = fit_cos_between(&fit->branch[i], &fit->branch[j]);
-            const float both = c / larger(fit_sin_between(&fit->branch[i], &fit->branch[j]), 0.1f);
-            cot[i] = larger(cot[i], both);
-            cot[j] = larger(cot[j], both);
-        }
-        largest = larger(largest, cot[i]);
+        const oc_fit_branch_t *b = &fit->branch[i];
+        crowd->ux[i] = b->ux;
+        crowd->uy[i] = b->uy;
+        crowd->side[i] = b->side;
+        crowd->amplitude[i] = b->amplitude;
     }
+}
+
+static float fit_largest_cot(const oc_kernels_t *kernels, const oc_fit_t *fit)
+{
+    oc_fit_crowd_t crowd;
+    float cot[OC_FIT_MAX_BRANCHES], largest = 0.0f;
+    fit_crowd(fit, &crowd);
+    kernels->acute(&crowd, fit->n, cot);
+    for (uint32_t i = 0; i < fit->n; i++) largest = larger(largest, cot[i]);
     return largest;
 }
 
 /* Is the apex where a corner seen at the pixel may have it? Blur moves the
  * seen tip of an acute corner inwards. */
-static bool fit_is_near(const oc_fit_t *fit)
+static bool fit_is_near(const oc_kernels_t *kernels, const oc_fit_t *fit)
 {
     const float dx = fit->x_px - fit->from_x_px;
     const float dy = fit->y_px - fit->from_y_px;
     const float away2 = dx * dx + dy * dy, always_px = INNER_PX + 2.0f + BLUNT_PX;
     if (away2 <= always_px * always_px) return true;
 
-    float cot[OC_FIT_MAX_BRANCHES];
-    const float limit_px = smaller(INNER_PX + 2.0f * ACUTE_PX * fit_acute_cots(fit, cot), 6.0f) + 2.0f + BLUNT_PX;
+    const float limit_px = smaller(INNER_PX + 2.0f * ACUTE_PX * fit_largest_cot(kernels, fit), 6.0f) + 2.0f + BLUNT_PX;
     return away2 <= limit_px * limit_px;
 }
 
@@ -250,12 +254,12 @@ static bool fit_bends(const oc_fit_t *fit, float cos_min_angle, float cos_min_be
 
 /* What an acute pair loses at the tip it may take further out. */
 static bool branch_follow_from(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit,
-                               const oc_fit_blur_t *blur, uint32_t i, const fit_reach_t *reach, oc_fit_span_t *span,
-                               oc_fit_branch_t *branch)
+                               const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur, uint32_t i,
+                               const fit_reach_t *reach, oc_fit_span_t *span, oc_fit_branch_t *branch)
 {
     span->shortest_px = larger(reach->shortest_px, span->inner_px + SPAN_PX);
     span->longest_px = larger(reach->longest_px + span->inner_px - reach->inner_px, span->shortest_px);
-    return oc_judoca_branch_follow(gradient, rules, fit, blur, i, span, branch);
+    return oc_judoca_branch_follow(gradient, rules, fit, crowd, blur, i, span, branch);
 }
 
 static oc_fit_blur_t blur_of(float s2)
@@ -271,7 +275,9 @@ static bool fit_pass(const oc_gradient_t *gradient, const oc_fit_rules_t *rules,
     oc_fit_branch_t held[OC_FIT_MAX_BRANCHES];
     uint32_t n_held = 0;
     float cot[OC_FIT_MAX_BRANCHES];
-    (void)fit_acute_cots(fit, cot);
+    oc_fit_crowd_t crowd;
+    fit_crowd(fit, &crowd);
+    gradient->kernels->acute(&crowd, fit->n, cot);
     const oc_fit_blur_t blur = blur_of(fit->blur_px2);
     for (uint32_t i = 0; i < fit->n; i++) {
         const float acute_px = smaller(ACUTE_PX * cot[i], ACUTE_MAX_PX);
@@ -282,11 +288,11 @@ static bool fit_pass(const oc_gradient_t *gradient, const oc_fit_rules_t *rules,
                               .has_model = reach->has_model};
         if (reach->across_px > 0) span.inner_px = span.crowded_px;
         oc_fit_branch_t branch = fit->branch[i];
-        bool holds = branch_follow_from(gradient, rules, fit, &blur, i, reach, &span, &branch);
+        bool holds = branch_follow_from(gradient, rules, fit, &crowd, &blur, i, reach, &span, &branch);
         if (!holds && span.inner_px > reach->inner_px + 0.5f && fit->branch[i].n > 0.0f) {
             span.inner_px = reach->inner_px;
             branch = fit->branch[i];
-            holds = branch_follow_from(gradient, rules, fit, &blur, i, reach, &span, &branch);
+            holds = branch_follow_from(gradient, rules, fit, &crowd, &blur, i, reach, &span, &branch);
         }
         if (holds) held[n_held++] = branch;
     }
@@ -301,7 +307,7 @@ static bool fit_pass(const oc_gradient_t *gradient, const oc_fit_rules_t *rules,
     fit_apply(fit, move);
     *moved_px = sqrtf(move[0] * move[0] + move[1] * move[1]);
     fit_measure_blur(fit, rules->sigma_px);
-    return fit_is_near(fit) &&
+    return fit_is_near(gradient->kernels, fit) &&
            fit_bends(fit, rules->cos_min_angle, reach->has_model ? rules->cos_min_bend : rules->cos_first_bend);
 }
 
@@ -313,6 +319,8 @@ void oc_judoca_ring_build(oc_ring_table_t *table, int32_t first_px, uint32_t wid
         const double angle = d * 6.283185307179586 / OC_RAYS;
         table->ux[d] = (float)cos(angle);
         table->uy[d] = (float)sin(angle);
+        table->across[d][0] = (int16_t)lrint(-(1 << 14) * sin(angle));
+        table->across[d][1] = (int16_t)lrint((1 << 14) * cos(angle));
         for (uint32_t s = 0; s < OC_RING_SAMPLES; s++) {
             const double radius = first_px + (int32_t)s;
             table->at[s][d] =

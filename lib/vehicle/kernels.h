@@ -61,7 +61,7 @@ typedef struct oc_fit_walk {
     int32_t first, sign;            /* first major coordinate and its step */
     uint32_t n;                     /* samples to take, all inside the image along the major axis */
     float a_major, a_minor;         /* apex */
-    float nx, ny;                   /* unit normal on the side of the gradient */
+    int32_t nx, ny;                 /* normal on the side of the gradient, 1/2^14 */
     float own_major, own_minor;     /* unit vector along the branch */
     float per_major;                /* 1 / own_major */
     float to_d;                     /* the minor axis on the normal (-uy, ux) */
@@ -69,17 +69,20 @@ typedef struct oc_fit_walk {
     float crowded_px;               /* nearer than this another ridge may hide a sample */
     float shortest_px;              /* up to here missing samples end nothing */
     float far_px;                   /* samples from here on tell the blur */
+    uint32_t self;                  /* lane of the crowd */
+    uint32_t axis;                  /* the major one: 0 x, 1 y */
     int32_t reach;                  /* half width of the search across, 0..OC_FIT_MAX_REACH */
     bool has_model;                 /* branches end at the apex: level the ridge */
 } oc_fit_walk_t;
 
-/* What another branch adds to this one's derivative near the apex: the
- * Gaussian ridge of a half line from the apex. */
-typedef struct oc_fit_rival {
-    float u_major, u_minor; /* along the rival */
-    float amplitude;        /* of its ridge in this branch's derivative, signed */
-    float apart;            /* px between the two per px along this one */
-} oc_fit_rival_t;
+/* All branches of a fit, one per lane; lanes without one are 0. Of those at the end the strongest OC_MAX_BRANCHES
+ * leave. */
+#define OC_FIT_MAX_BRANCHES 8u
+typedef struct oc_fit_crowd {
+    float ux[OC_FIT_MAX_BRANCHES], uy[OC_FIT_MAX_BRANCHES]; /* along the branch */
+    float side[OC_FIT_MAX_BRANCHES];                        /* of the gradient */
+    float amplitude[OC_FIT_MAX_BRANCHES];                   /* of the ridge */
+} oc_fit_crowd_t;
 
 /* A ridge further off than this many of its widths adds nothing. */
 #define OC_FIT_RIVAL_WIDTHS 3.0f
@@ -112,6 +115,7 @@ typedef struct oc_fit_sums {
 #define OC_RING_SAMPLES 5u
 typedef struct oc_ring_table {
     float ux[OC_RAYS], uy[OC_RAYS];
+    int16_t across[OC_RAYS][2];           /* the normal (-uy, ux), 1/2^14 */
     int32_t at[OC_RING_SAMPLES][OC_RAYS]; /* pixels from the apex' into the planes */
 } oc_ring_table_t;
 
@@ -148,9 +152,13 @@ typedef struct oc_kernels {
     uint32_t (*ring)(const oc_ring_table_t *table, const int16_t *apex, float floor, float contrast,
                      float ring[OC_RAYS]);
 
-    /* Ridge positions along a branch, what the rivals add taken off, and the sums over them. */
-    void (*follow)(const oc_fit_walk_t *walk, const oc_fit_rival_t rivals[], uint32_t n_rivals,
-                   const oc_fit_blur_t *blur, oc_fit_profile_t *out, oc_fit_sums_t *sums);
+    /* Cotangent of the angle to the nearest other branch, for each; 0 without an acute angle. */
+    void (*acute)(const oc_fit_crowd_t *crowd, uint32_t n, float cot[OC_FIT_MAX_BRANCHES]);
+
+    /* Ridge positions along a branch, what the others add to its derivative near the apex taken off, and the sums over
+     * them. */
+    void (*follow)(const oc_fit_walk_t *walk, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur,
+                   oc_fit_profile_t *out, oc_fit_sums_t *sums);
 
     /* Sums over some positions, bit m = sample m, at least one. */
     void (*sums)(const oc_fit_profile_t *profile, uint32_t places, float far_px, oc_fit_sums_t *sums);

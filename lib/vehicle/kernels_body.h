@@ -313,6 +313,7 @@ const oc_kernels_t OC_KERNELS_TABLE = {
     .spread = kernel_spread,
     .rays = kernel_rays,
     .ring = kernel_ring,
+    .acute = kernel_acute,
     .follow = kernel_follow,
     .sums = kernel_sums,
 };

@@ -94,21 +94,13 @@ KERNEL_INLINE oc_ints_t pairs_take(const int16_t *const from[LANES], ptrdiff_t s
     return (oc_ints_t){pair[0], pair[1], pair[2], pair[3], pair[4], pair[5], pair[6], pair[7]};
 }
 
-KERNEL_INLINE oc_lanes_t pairs_dx(oc_ints_t pair)
+/* Of pairs (dx, dy) the sum dx x + dy y, x and y in 1/2^14. */
+KERNEL_INLINE oc_lanes_t pairs_along(oc_ints_t pair, int32_t x, int32_t y)
 {
 #if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
-    return __builtin_convertvector((oc_ints_t)((oc_uints_t)pair << 16) >> 16, oc_lanes_t);
+    return __builtin_convertvector(oc_lanes_pair_sum(pair, x, y), oc_lanes_t) * (1.0f / (1 << 14));
 #else
-    return __builtin_convertvector(pair >> 16, oc_lanes_t);
-#endif
-}
-
-KERNEL_INLINE oc_lanes_t pairs_dy(oc_ints_t pair)
-{
-#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
-    return __builtin_convertvector(pair >> 16, oc_lanes_t);
-#else
-    return __builtin_convertvector((oc_ints_t)((oc_uints_t)pair << 16) >> 16, oc_lanes_t);
+    return __builtin_convertvector(oc_lanes_pair_sum(pair, y, x), oc_lanes_t) * (1.0f / (1 << 14));
 #endif
 }
 
@@ -116,12 +108,12 @@ KERNEL_INLINE oc_lanes_t pairs_dy(oc_ints_t pair)
 KERNEL_INLINE void ridge_find(const oc_fit_walk_t *walk, const int16_t *const from[LANES], kernel_ridge_t *ridge,
                               const int32_t reach)
 {
-    const int32_t n_taps = 2 * reach + 3;
+    const int32_t n_taps = 2 * reach + 3, nx = walk->nx, ny = walk->ny;
     oc_ints_t pair[MAX_TAPS];
     oc_lanes_t normal[MAX_TAPS];
     for (int32_t k = 0; k < n_taps; k++) {
         pair[k] = pairs_take(from, 2 * k * (ptrdiff_t)walk->step_minor);
-        normal[k] = pairs_dx(pair[k]) * walk->nx + pairs_dy(pair[k]) * walk->ny;
+        normal[k] = pairs_along(pair[k], nx, ny);
     }
     oc_ints_t at_ridge = pair[1];
     ridge->before = normal[0];
@@ -136,7 +128,7 @@ KERNEL_INLINE void ridge_find(const oc_fit_walk_t *walk, const int16_t *const fr
         at_ridge = (oc_ints_t)oc_lanes_select(is_higher, (oc_lanes_t)pair[k], (oc_lanes_t)at_ridge);
         ridge->middle = oc_lanes_max(normal[k], ridge->middle);
     }
-    ridge->along = pairs_dy(at_ridge) * walk->nx - pairs_dx(at_ridge) * walk->ny;
+    ridge->along = pairs_along(at_ridge, -ny, nx);
 }
 
 /* Samples m .. m + 7; those behind the last repeat it. */
@@ -166,14 +158,43 @@ KERNEL_INLINE void ridge_take(const oc_fit_walk_t *walk, int32_t m, kernel_ridge
     ridge_find(walk, from, ridge, reach);
 }
 
-/* Take off what a rival branch adds to the three taps. */
-KERNEL_INLINE void ridge_clear(const oc_fit_rival_t *rival, const oc_fit_blur_t *blur, kernel_ridge_t *ridge)
+/* What another branch adds to this one's derivative near the apex: the Gaussian ridge of a half line from there. */
+typedef struct kernel_rivals {
+    uint32_t which;                                                       /* bit per lane of the crowd */
+    float t_major[OC_LANES], t_minor[OC_LANES];                           /* along the rival, st */
+    float d_major[OC_LANES], d_minor[OC_LANES];                           /* along the rival, s */
+    float amplitude[OC_LANES];                                            /* in this branch's derivative, signed */
+    float reach[OC_LANES];                                                /* further out on this branch it adds nothing */
+} kernel_rivals_t;
+
+KERNEL_INLINE void rivals_find(const oc_fit_walk_t *walk, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur,
+                               kernel_rivals_t *rivals)
 {
-    const float amplitude = rival->amplitude;
-    const float t_major = rival->u_major * blur->inv_st, dt = rival->u_minor * blur->inv_st;
-    const float d_major = rival->u_minor * blur->inv_s, dd = rival->u_major * blur->inv_s;
+    const uint32_t self = walk->self;
+    const oc_lanes_t ux = lanes_load(crowd->ux), uy = lanes_load(crowd->uy);
+    const oc_lanes_t major = lanes_load(walk->axis ? crowd->uy : crowd->ux);
+    const oc_lanes_t minor = lanes_load(walk->axis ? crowd->ux : crowd->uy);
+    const oc_lanes_t cosine = ux * crowd->ux[self] + uy * crowd->uy[self];
+    const oc_lanes_t sine = lanes_size(uy * crowd->ux[self] - ux * crowd->uy[self]);
+    const oc_lanes_t agree = cosine * lanes_load(crowd->side) * crowd->side[self];
+    /* px between the two per px along this one */
+    const oc_lanes_t apart = oc_lanes_select(cosine > 0.0f, oc_lanes_max(sine, lanes_all(0.1f)), lanes_all(1.0f));
+    lanes_store(rivals->t_major, major * blur->inv_st);
+    lanes_store(rivals->t_minor, minor * blur->inv_st);
+    lanes_store(rivals->d_major, major * blur->inv_s);
+    lanes_store(rivals->d_minor, minor * blur->inv_s);
+    lanes_store(rivals->amplitude, agree * lanes_load(crowd->amplitude));
+    lanes_store(rivals->reach, OC_FIT_RIVAL_WIDTHS * blur->s / apart);
+    rivals->which = oc_bits_of_lanes(lanes_size(agree) >= 0.02f) & ~(1u << self);
+}
+
+/* Take off what a rival adds to the three taps. */
+KERNEL_INLINE void ridge_clear(const kernel_rivals_t *rivals, uint32_t j, kernel_ridge_t *ridge)
+{
+    const float amplitude = rivals->amplitude[j], dt = rivals->t_minor[j], dd = rivals->d_major[j];
     const oc_lanes_t minor = ridge->centre + ridge->offset;
-    const oc_lanes_t t = ridge->major * t_major + minor * dt, d = minor * dd - ridge->major * d_major;
+    const oc_lanes_t t = ridge->major * rivals->t_major[j] + minor * dt;
+    const oc_lanes_t d = minor * dd - ridge->major * rivals->d_minor[j];
     ridge->before -= amplitude * lanes_bell(d - dd) * lanes_step(t - dt);
     ridge->middle -= amplitude * lanes_bell(d) * lanes_step(t);
     ridge->after -= amplitude * lanes_bell(d + dd) * lanes_step(t + dt);
@@ -289,18 +310,21 @@ static void kernel_sums(const oc_fit_profile_t *profile, uint32_t places, float 
 
 /* ---- a branch ---- */
 
-KERNEL_INLINE void follow_reach(const oc_fit_walk_t *walk, const oc_fit_rival_t rivals[], uint32_t n_rivals,
-                                const oc_fit_blur_t *blur, oc_fit_profile_t *out, oc_fit_sums_t *sums,
-                                const int32_t reach)
+KERNEL_INLINE void follow_reach(const oc_fit_walk_t *walk, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur,
+                                oc_fit_profile_t *out, oc_fit_sums_t *sums, const int32_t reach)
 {
     kernel_marks_t marks = {0};
+    kernel_rivals_t rivals;
+    memset(&rivals, 0, sizeof rivals);
+    if (walk->has_model) rivals_find(walk, crowd, blur, &rivals);
     const int32_t n = (int32_t)walk->n;
     for (int32_t m = 0; m < n; m += LANES) {
         const float from_px = ((float)(walk->first + walk->sign * m) - walk->a_major) * walk->per_major;
         kernel_ridge_t ridge;
         ridge_take(walk, m, &ridge, reach);
-        for (uint32_t j = 0; j < n_rivals; j++) {
-            if (from_px * rivals[j].apart < OC_FIT_RIVAL_WIDTHS * blur->s) ridge_clear(&rivals[j], blur, &ridge);
+        const uint32_t near = oc_bits_of_lanes(lanes_load(rivals.reach) > from_px);
+        for (uint32_t rest = rivals.which & near; rest; rest &= rest - 1u) {
+            ridge_clear(&rivals, (uint32_t)__builtin_ctz(rest), &ridge);
         }
         if (walk->has_model && from_px < 3.0f * blur->st + 1.0f) ridge_level(walk, blur, &ridge);
         /* Without a search the ridge may be nearer to the next pixel. */
@@ -310,43 +334,56 @@ KERNEL_INLINE void follow_reach(const oc_fit_walk_t *walk, const oc_fit_rival_t 
     sums_take(out, out->place, walk->far_px, sums);
 }
 
-static void kernel_follow(const oc_fit_walk_t *walk, const oc_fit_rival_t rivals[], uint32_t n_rivals,
-                          const oc_fit_blur_t *blur, oc_fit_profile_t *out, oc_fit_sums_t *sums)
+static void kernel_follow(const oc_fit_walk_t *walk, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur,
+                          oc_fit_profile_t *out, oc_fit_sums_t *sums)
 {
     switch (walk->reach) {
-    case 0: follow_reach(walk, rivals, n_rivals, blur, out, sums, 0); break;
-    case 1: follow_reach(walk, rivals, n_rivals, blur, out, sums, 1); break;
-    default: follow_reach(walk, rivals, n_rivals, blur, out, sums, 2); break;
+    case 0: follow_reach(walk, crowd, blur, out, sums, 0); break;
+    case 1: follow_reach(walk, crowd, blur, out, sums, 1); break;
+    default: follow_reach(walk, crowd, blur, out, sums, 2); break;
     }
+}
+
+static void kernel_acute(const oc_fit_crowd_t *crowd, uint32_t n, float cot[OC_FIT_MAX_BRANCHES])
+{
+    const oc_lanes_t ux = lanes_load(crowd->ux), uy = lanes_load(crowd->uy);
+    oc_lanes_t largest = {0};
+    for (uint32_t i = 0; i < n; i++) {
+        const oc_lanes_t sine = lanes_size(uy * crowd->ux[i] - ux * crowd->uy[i]);
+        const oc_lanes_t both = (ux * crowd->ux[i] + uy * crowd->uy[i]) / oc_lanes_max(sine, lanes_all(0.1f));
+        largest = oc_lanes_max(lanes_where(kLaneOrder != (int32_t)i, both), largest);
+    }
+    lanes_store(cot, largest);
 }
 
 /* ---- round the apex ---- */
 
 /* Eight directions of a ring. */
-KERNEL_INLINE oc_lanes_t ring_take(const oc_ring_table_t *table, const int16_t *apex, float floor, uint32_t d)
+KERNEL_INLINE oc_lanes_t ring_take(const oc_ring_table_t *table, const int16_t *apex, int32_t floor, uint32_t d)
 {
-    const oc_lanes_t ux = lanes_load(table->ux + d), uy = lanes_load(table->uy + d);
-    oc_lanes_t sum = {0};
+    oc_ints_t across;
+    memcpy(&across, table->across + d, sizeof across);
+    oc_ints_t sum = {0};
     oc_ints_t n_front = {0}, n_back = {0};
     for (uint32_t s = 0; s < OC_RING_SAMPLES; s++) {
         const int16_t *from[LANES];
         for (uint32_t i = 0; i < OC_LANES; i++) from[i] = apex + 2 * (ptrdiff_t)table->at[s][d + i];
         const oc_ints_t pair = pairs_take(from, 0);
-        const oc_lanes_t v = ux * pairs_dy(pair) - uy * pairs_dx(pair);
+        const oc_ints_t v = oc_lanes_pair_sums(pair, across) >> 14;
         sum += v;
         n_front -= v > floor;
         n_back -= v < -floor;
     }
-    const oc_ints_t is_front = sum > 0.0f;
+    const oc_ints_t is_front = sum > 0;
     const oc_ints_t n_steady = (is_front & n_front) | (~is_front & n_back);
-    return lanes_where(n_steady >= (int32_t)OC_RING_SAMPLES - 1, sum * (1.0f / OC_RING_SAMPLES));
+    return lanes_where(n_steady >= (int32_t)OC_RING_SAMPLES - 1, __builtin_convertvector(sum, oc_lanes_t) * (1.0f / OC_RING_SAMPLES));
 }
 
 static uint32_t kernel_ring(const oc_ring_table_t *table, const int16_t *apex, float floor, float contrast,
                             float ring[OC_RAYS])
 {
     float closed[OC_RAYS + 2u]; /* one direction more at either end */
-    for (uint32_t d = 0; d < OC_RAYS; d += OC_LANES) lanes_store(closed + 1 + d, ring_take(table, apex, floor, d));
+    for (uint32_t d = 0; d < OC_RAYS; d += OC_LANES) lanes_store(closed + 1 + d, ring_take(table, apex, (int32_t)floor, d));
     closed[0] = closed[OC_RAYS];
     closed[OC_RAYS + 1u] = closed[1];
     memcpy(ring, closed + 1, OC_RAYS * sizeof ring[0]);

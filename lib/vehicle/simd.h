@@ -53,6 +53,31 @@ static inline oc_lanes_t oc_lanes_max(oc_lanes_t a, oc_lanes_t b)
 #endif
 }
 
+/* x times the first of each pair of 16 bits (the low ones where bytes are little-endian) plus y times the second; the
+ * sum must fit. */
+static inline oc_ints_t oc_lanes_pair_sums(oc_ints_t pair, oc_ints_t by)
+{
+#if defined(__AVX2__) && !defined(OC_KERNELS_SCALAR)
+    return (oc_ints_t)_mm256_madd_epi16((__m256i)pair, (__m256i)by);
+#elif defined(__SSE2__) && !defined(OC_KERNELS_SCALAR)
+    __m128i a[2], b[2];
+    memcpy(a, &pair, sizeof a);
+    memcpy(b, &by, sizeof b);
+    for (int i = 0; i < 2; i++) a[i] = _mm_madd_epi16(a[i], b[i]);
+    memcpy(&pair, a, sizeof a);
+    return pair;
+#else
+    const oc_ints_t low = (oc_ints_t)((oc_uints_t)pair << 16) >> 16, by_low = (oc_ints_t)((oc_uints_t)by << 16) >> 16;
+    return low * by_low + (pair >> 16) * (by >> 16);
+#endif
+}
+
+static inline oc_ints_t oc_lanes_pair_sum(oc_ints_t pair, int32_t x, int32_t y)
+{
+    const oc_ints_t none = {0};
+    return oc_lanes_pair_sums(pair, none + (int32_t)(((uint32_t)x & 0xffffu) | (uint32_t)y << 16));
+}
+
 /* The two halves added. */
 typedef float oc_quad_t __attribute__((vector_size(16)));
 static inline oc_quad_t oc_lanes_fold(oc_lanes_t v)
