@@ -52,6 +52,7 @@ typedef struct oc_fit {
     float from_x_px, from_y_px; /* pixel where the junction was seen */
     uint32_t n;
     oc_fit_branch_t branch[OC_FIT_MAX_BRANCHES];
+    oc_fit_crowd_t crowd; /* the same side by side, as of the last pass */
 } oc_fit_t;
 
 /* A ridge's variance across the edge is larger than along it by what the central difference adds. */

@@ -205,9 +205,9 @@ static void fit_measure_blur(oc_fit_t *fit, float sigma_px)
     fit->blur_px2 = smaller(larger(sum / n, base + MIN_BLUR_PX2), base + MAX_BLUR_PX2);
 }
 
-static void fit_crowd(const oc_fit_t *fit, oc_fit_crowd_t *crowd)
+static void fit_list(const oc_fit_t *fit, oc_fit_crowd_t *crowd)
 {
-    memset(crowd, 0, sizeof *crowd);
+    crowd->n = fit->n;
     for (uint32_t i = 0; i < fit->n; i++) {
         const oc_fit_branch_t *b = &fit->branch[i];
         crowd->ux[i] = b->ux;
@@ -217,19 +217,18 @@ static void fit_crowd(const oc_fit_t *fit, oc_fit_crowd_t *crowd)
     }
 }
 
-static float fit_largest_cot(const oc_kernels_t *kernels, const oc_fit_t *fit)
+static float fit_largest_cot(const oc_kernels_t *kernels, oc_fit_t *fit)
 {
-    oc_fit_crowd_t crowd;
     float cot[OC_FIT_MAX_BRANCHES], largest = 0.0f;
-    fit_crowd(fit, &crowd);
-    kernels->acute(&crowd, fit->n, cot);
+    fit_list(fit, &fit->crowd);
+    kernels->acute(&fit->crowd, cot);
     for (uint32_t i = 0; i < fit->n; i++) largest = larger(largest, cot[i]);
     return largest;
 }
 
 /* Is the apex where a corner seen at the pixel may have it? Blur moves the
  * seen tip of an acute corner inwards. */
-static bool fit_is_near(const oc_kernels_t *kernels, const oc_fit_t *fit)
+static bool fit_is_near(const oc_kernels_t *kernels, oc_fit_t *fit)
 {
     const float dx = fit->x_px - fit->from_x_px;
     const float dy = fit->y_px - fit->from_y_px;
@@ -275,24 +274,23 @@ static bool fit_pass(const oc_gradient_t *gradient, const oc_fit_rules_t *rules,
     oc_fit_branch_t held[OC_FIT_MAX_BRANCHES];
     uint32_t n_held = 0;
     float cot[OC_FIT_MAX_BRANCHES];
-    oc_fit_crowd_t crowd;
-    fit_crowd(fit, &crowd);
-    gradient->kernels->acute(&crowd, fit->n, cot);
+    fit_list(fit, &fit->crowd);
+    gradient->kernels->acute(&fit->crowd, cot);
     const oc_fit_blur_t blur = blur_of(fit->blur_px2);
+    const float searched = reach->across_px > 0 ? 1.0f : 0.0f;
     for (uint32_t i = 0; i < fit->n; i++) {
         const float acute_px = smaller(ACUTE_PX * cot[i], ACUTE_MAX_PX);
-        oc_fit_span_t span = {.inner_px = reach->inner_px,
+        oc_fit_span_t span = {.inner_px = reach->inner_px + acute_px * searched,
                               .crowded_px = reach->inner_px + acute_px,
                               .asked_px = reach->shortest_px,
                               .across_px = reach->across_px,
                               .has_model = reach->has_model};
-        if (reach->across_px > 0) span.inner_px = span.crowded_px;
         oc_fit_branch_t branch = fit->branch[i];
-        bool holds = branch_follow_from(gradient, rules, fit, &crowd, &blur, i, reach, &span, &branch);
+        bool holds = branch_follow_from(gradient, rules, fit, &fit->crowd, &blur, i, reach, &span, &branch);
         if (!holds && span.inner_px > reach->inner_px + 0.5f && fit->branch[i].n > 0.0f) {
             span.inner_px = reach->inner_px;
             branch = fit->branch[i];
-            holds = branch_follow_from(gradient, rules, fit, &crowd, &blur, i, reach, &span, &branch);
+            holds = branch_follow_from(gradient, rules, fit, &fit->crowd, &blur, i, reach, &span, &branch);
         }
         if (holds) held[n_held++] = branch;
     }
@@ -329,6 +327,16 @@ void oc_judoca_ring_build(oc_ring_table_t *table, int32_t first_px, uint32_t wid
     }
 }
 
+/* A branch that has not been followed yet. */
+static void branch_begin(oc_fit_branch_t *branch, float ux, float uy, float side, float amplitude)
+{
+    branch->ux = ux;
+    branch->uy = uy;
+    branch->side = side;
+    branch->amplitude = amplitude;
+    branch->n = 0.0f;
+}
+
 bool oc_judoca_fit_begin(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, float x_px, float y_px,
                          const oc_fit_seed_t seed[], uint32_t n_seeds, oc_fit_t *fit)
 {
@@ -338,12 +346,8 @@ bool oc_judoca_fit_begin(const oc_gradient_t *gradient, const oc_fit_rules_t *ru
     fit->y_px = fit->from_y_px = y_px;
     fit->blur_px2 = rules->sigma_px * rules->sigma_px + 0.9f;
     fit->n = n_seeds < OC_FIT_MAX_BRANCHES ? n_seeds : OC_FIT_MAX_BRANCHES;
-    for (uint32_t i = 0; i < fit->n; i++) {
-        memset(&fit->branch[i], 0, sizeof fit->branch[i]);
-        fit->branch[i].ux = seed[i].ux;
-        fit->branch[i].uy = seed[i].uy;
-        fit->branch[i].side = seed[i].side;
-    }
+    for (uint32_t i = 0; i < fit->n; i++) branch_begin(&fit->branch[i], seed[i].ux, seed[i].uy, seed[i].side, 0.0f);
+    memset(&fit->crowd, 0, sizeof fit->crowd);
     const float shortest_px = smaller(rules->lambda_min_px, FIRST_LOOK_PX);
     const fit_reach_t reach = {2, INNER_PX, shortest_px, shortest_px + 1.0f, false};
     return fit_pass(gradient, rules, &reach, fit, &fit->moved_px);
@@ -384,13 +388,9 @@ static void fit_look_round(const oc_gradient_t *gradient, const oc_fit_rules_t *
     uint32_t rest = ring_measure(gradient, fit, t_b, &rules->ring[is_far], ring);
     for (; rest && fit->n < OC_FIT_MAX_BRANCHES; rest &= rest - 1u) {
         const uint32_t d = (uint32_t)__builtin_ctz(rest);
-        oc_fit_branch_t made;
-        memset(&made, 0, sizeof made);
-        made.ux = rules->ring[0].ux[d];
-        made.uy = rules->ring[0].uy[d];
-        made.side = ring[d] > 0.0f ? 1.0f : -1.0f;
-        made.amplitude = fabsf(ring[d]);
-        if (fit_lacks(fit, &made, is_far)) fit->branch[fit->n++] = made;
+        oc_fit_branch_t *made = &fit->branch[fit->n];
+        branch_begin(made, rules->ring[0].ux[d], rules->ring[0].uy[d], ring[d] > 0.0f ? 1.0f : -1.0f, fabsf(ring[d]));
+        if (fit_lacks(fit, made, is_far)) fit->n++;
     }
 }
 

@@ -72,13 +72,14 @@ typedef struct oc_fit_walk {
     uint32_t self;                  /* lane of the crowd */
     uint32_t axis;                  /* the major one: 0 x, 1 y */
     int32_t reach;                  /* half width of the search across, 0..OC_FIT_MAX_REACH */
-    bool has_model;                 /* branches end at the apex: level the ridge */
+    bool has_model;                 /* branches end at the apex and add to each other; without, the reach is the largest */
 } oc_fit_walk_t;
 
-/* All branches of a fit, one per lane; lanes without one are 0. Of those at the end the strongest OC_MAX_BRANCHES
+/* All branches of a fit, one per lane; lanes from n on hold any numbers. Of those at the end the strongest OC_MAX_BRANCHES
  * leave. */
 #define OC_FIT_MAX_BRANCHES 8u
 typedef struct oc_fit_crowd {
+    uint32_t n;
     float ux[OC_FIT_MAX_BRANCHES], uy[OC_FIT_MAX_BRANCHES]; /* along the branch */
     float side[OC_FIT_MAX_BRANCHES];                        /* of the gradient */
     float amplitude[OC_FIT_MAX_BRANCHES];                   /* of the ridge */
@@ -153,7 +154,7 @@ typedef struct oc_kernels {
                      float ring[OC_RAYS]);
 
     /* Cotangent of the angle to the nearest other branch, for each; 0 without an acute angle. */
-    void (*acute)(const oc_fit_crowd_t *crowd, uint32_t n, float cot[OC_FIT_MAX_BRANCHES]);
+    void (*acute)(const oc_fit_crowd_t *crowd, float cot[OC_FIT_MAX_BRANCHES]);
 
     /* Ridge positions along a branch, what the others add to its derivative near the apex taken off, and the sums over
      * them. */

@@ -185,7 +185,7 @@ KERNEL_INLINE void rivals_find(const oc_fit_walk_t *walk, const oc_fit_crowd_t *
     lanes_store(rivals->d_minor, minor * blur->inv_s);
     lanes_store(rivals->amplitude, agree * lanes_load(crowd->amplitude));
     lanes_store(rivals->reach, OC_FIT_RIVAL_WIDTHS * blur->s / apart);
-    rivals->which = oc_bits_of_lanes(lanes_size(agree) >= 0.02f) & ~(1u << self);
+    rivals->which = oc_bits_of_lanes(lanes_size(agree) >= 0.02f) & ~(1u << self) & ((1u << crowd->n) - 1u);
 }
 
 /* Take off what a rival adds to the three taps. */
@@ -211,6 +211,15 @@ KERNEL_INLINE void ridge_level(const oc_fit_walk_t *walk, const oc_fit_blur_t *b
     ridge->before *= here / (lanes_step(t - u_minor) + 0.01f);
     ridge->after *= here / (lanes_step(t + u_minor) + 0.01f);
     ridge->middle *= here / (here + 0.01f);
+}
+
+/* Leave of the ridge what the branch would show if it were alone and had no end. */
+KERNEL_INLINE void ridge_alone(const oc_fit_walk_t *walk, const kernel_rivals_t *rivals, const oc_fit_blur_t *blur,
+                               float from_px, kernel_ridge_t *ridge)
+{
+    uint32_t rest = rivals->which & oc_bits_of_lanes(lanes_load(rivals->reach) > from_px);
+    for (; rest; rest &= rest - 1u) ridge_clear(rivals, (uint32_t)__builtin_ctz(rest), ridge);
+    if (from_px < 3.0f * blur->st + 1.0f) ridge_level(walk, blur, ridge);
 }
 
 /* What is known of the samples, bit m = sample m. */
@@ -311,22 +320,18 @@ static void kernel_sums(const oc_fit_profile_t *profile, uint32_t places, float 
 /* ---- a branch ---- */
 
 KERNEL_INLINE void follow_reach(const oc_fit_walk_t *walk, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur,
-                                oc_fit_profile_t *out, oc_fit_sums_t *sums, const int32_t reach)
+                                oc_fit_profile_t *out, oc_fit_sums_t *sums, const int32_t reach,
+                                const bool has_model)
 {
     kernel_marks_t marks = {0};
     kernel_rivals_t rivals;
-    memset(&rivals, 0, sizeof rivals);
-    if (walk->has_model) rivals_find(walk, crowd, blur, &rivals);
+    if (has_model) rivals_find(walk, crowd, blur, &rivals);
     const int32_t n = (int32_t)walk->n;
     for (int32_t m = 0; m < n; m += LANES) {
         const float from_px = ((float)(walk->first + walk->sign * m) - walk->a_major) * walk->per_major;
         kernel_ridge_t ridge;
         ridge_take(walk, m, &ridge, reach);
-        const uint32_t near = oc_bits_of_lanes(lanes_load(rivals.reach) > from_px);
-        for (uint32_t rest = rivals.which & near; rest; rest &= rest - 1u) {
-            ridge_clear(&rivals, (uint32_t)__builtin_ctz(rest), &ridge);
-        }
-        if (walk->has_model && from_px < 3.0f * blur->st + 1.0f) ridge_level(walk, blur, &ridge);
+        if (has_model) ridge_alone(walk, &rivals, blur, from_px, &ridge);
         /* Without a search the ridge may be nearer to the next pixel. */
         ridge_peak(walk, &ridge, blur, reach == 0 ? 1.0f : 0.51f, m, out, &marks);
     }
@@ -337,18 +342,19 @@ KERNEL_INLINE void follow_reach(const oc_fit_walk_t *walk, const oc_fit_crowd_t 
 static void kernel_follow(const oc_fit_walk_t *walk, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur,
                           oc_fit_profile_t *out, oc_fit_sums_t *sums)
 {
-    switch (walk->reach) {
-    case 0: follow_reach(walk, crowd, blur, out, sums, 0); break;
-    case 1: follow_reach(walk, crowd, blur, out, sums, 1); break;
-    default: follow_reach(walk, crowd, blur, out, sums, 2); break;
+    switch (walk->has_model ? walk->reach : -1) {
+    case -1: follow_reach(walk, crowd, blur, out, sums, OC_FIT_MAX_REACH, false); break;
+    case 0: follow_reach(walk, crowd, blur, out, sums, 0, true); break;
+    case 1: follow_reach(walk, crowd, blur, out, sums, 1, true); break;
+    default: follow_reach(walk, crowd, blur, out, sums, OC_FIT_MAX_REACH, true); break;
     }
 }
 
-static void kernel_acute(const oc_fit_crowd_t *crowd, uint32_t n, float cot[OC_FIT_MAX_BRANCHES])
+static void kernel_acute(const oc_fit_crowd_t *crowd, float cot[OC_FIT_MAX_BRANCHES])
 {
     const oc_lanes_t ux = lanes_load(crowd->ux), uy = lanes_load(crowd->uy);
     oc_lanes_t largest = {0};
-    for (uint32_t i = 0; i < n; i++) {
+    for (uint32_t i = 0; i < crowd->n; i++) {
         const oc_lanes_t sine = lanes_size(uy * crowd->ux[i] - ux * crowd->uy[i]);
         const oc_lanes_t both = (ux * crowd->ux[i] + uy * crowd->uy[i]) / oc_lanes_max(sine, lanes_all(0.1f));
         largest = oc_lanes_max(lanes_where(kLaneOrder != (int32_t)i, both), largest);
