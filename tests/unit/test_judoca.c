@@ -519,7 +519,7 @@ static void bad_parameters_have_no_size_and_no_workspace(void)
     bad[11].max_apex_sigma_px = INFINITY;
     bad[12].min_distance_px = 0.5f;
     bad[13].max_junctions = OC_MAX_JUNCTIONS + 1;
-    bad[14].max_candidates = 0;
+    bad[14].max_candidates = 15;
     bad[15].spread_cell_px = 0;
     for (int i = 0; i < 16; i++) {
         oc_judoca_ws_t refused;
