@@ -3,17 +3,31 @@
 #include "core/junction.h"
 
 #include <math.h>
-#include <stdbool.h>
 
 #include "core/status.h"
 
-/* Rays that point away from each other within 12 degrees are one straight edge. */
-static bool is_straight(float a_rad, float b_rad)
+#define PI 3.14159265f
+
+/* 12 degrees. */
+#define STRAIGHT_RAD 0.20943951f
+
+bool oc_junction_is_straight(const oc_branch_t *a, const oc_branch_t *b)
 {
-    const float pi = 3.14159265f;
-    const float tolerance_rad = 0.20943951f;
-    const float turn = fabsf(a_rad - b_rad);
-    return fabsf(turn - pi) <= tolerance_rad;
+    OC_ASSERT(a && b);
+    const float turn_rad = fabsf(a->angle_rad - b->angle_rad);
+    return fabsf(turn_rad - PI) <= STRAIGHT_RAD;
+}
+
+uint8_t oc_junction_straight_branches(const oc_branch_t branch[], unsigned n_branches)
+{
+    OC_ASSERT((branch || n_branches == 0) && n_branches <= OC_MAX_BRANCHES);
+    unsigned straight = 0;
+    for (unsigned i = 1; i < n_branches; i++) {
+        for (unsigned j = 0; j < i; j++) {
+            if (oc_junction_is_straight(&branch[i], &branch[j])) straight |= 1u << i | 1u << j;
+        }
+    }
+    return (uint8_t)straight;
 }
 
 oc_junction_kind_t oc_junction_kind_of(const oc_branch_t branch[], unsigned n_branches)
@@ -22,9 +36,5 @@ oc_junction_kind_t oc_junction_kind_of(const oc_branch_t branch[], unsigned n_br
     if (n_branches == 2) return OC_KIND_L;
     if (n_branches == 4) return OC_KIND_X;
     if (n_branches != 3) return OC_KIND_OTHER;
-
-    const bool has_straight = is_straight(branch[0].angle_rad, branch[1].angle_rad) ||
-                              is_straight(branch[0].angle_rad, branch[2].angle_rad) ||
-                              is_straight(branch[1].angle_rad, branch[2].angle_rad);
-    return has_straight ? OC_KIND_T : OC_KIND_Y;
+    return oc_junction_straight_branches(branch, n_branches) ? OC_KIND_T : OC_KIND_Y;
 }

@@ -3,6 +3,7 @@
 #ifndef OUTCROP_CORE_JUNCTION_H
 #define OUTCROP_CORE_JUNCTION_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #ifdef __cplusplus
@@ -55,6 +56,16 @@ typedef struct oc_junction {
  * three of which two are collinear within 12 degrees are a T. Fewer than two
  * are OC_KIND_OTHER. */
 oc_junction_kind_t oc_junction_kind_of(const oc_branch_t branch[], unsigned n_branches);
+
+/* Two branches, angles in [0, 2 pi), that are one straight edge through the
+ * apex: they point away from each other within the same 12 degrees. Such a
+ * pair says nothing of a plane's turn about it. */
+bool oc_junction_is_straight(const oc_branch_t *a, const oc_branch_t *b);
+
+/* Branches that have a straight partner: bit i of branch[i]. The bar of a T
+ * has two bits, an X of two crossing edges four. n_branches at most
+ * OC_MAX_BRANCHES. */
+uint8_t oc_junction_straight_branches(const oc_branch_t branch[], unsigned n_branches);
 
 #ifdef __cplusplus
 }

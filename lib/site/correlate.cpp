@@ -336,6 +336,10 @@ void Correlator::add_branch_planes(int left, int right, const Eigen::Vector3d &p
             const Edge &a = edges[i];
             const Edge &b = edges[k];
             if (a.left == b.left || a.right == b.right) continue;
+            // One straight edge, the bar of a T say: any plane through it would do.
+            if (oc_junction_is_straight(&l.branch[a.left], &l.branch[b.left]) ||
+                oc_junction_is_straight(&r.branch[a.right], &r.branch[b.right]))
+                continue;
             // The order round the apex is the same from either camera on one side of the plane.
             if (!(turn(l, a.left, b.left) * turn(r, a.right, b.right) > 0)) continue;
             const double cosine = oc_vec3_dot(a.direction.d, b.direction.d);

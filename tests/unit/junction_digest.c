@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause
- * junction_digest [--list] [--frames N] [--method NAME] [FILE.pgm...]
+ * junction_digest [--list] [--frames N] [--method NAME] [--levels] [FILE.pgm...]
  *
  * Prints one line per picture and method: how many junctions the detector finds and a digest over the bits of every
  * number in them. Two machines that print the same found the same, bit for bit. Two pictures made here come first,
@@ -7,7 +7,8 @@
  *
  *   --list         the junctions too, each number as its bits
  *   --method NAME  default, fixed (lambda 10 throughout) or thesis; all three without it
- *   --frames N     detect in every file N times, perhaps 0, and print nothing but their sum: for counting instructions */
+ *   --frames N     detect in every file N times, perhaps 0, and print nothing but their sum: for counting instructions
+ *   --levels       hold every instruction set against the twin instead, in many settings; exit 1 when any differs */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,7 +23,7 @@ static const char *const method_name[N_METHODS] = {"default", "fixed", "thesis"}
 static uint8_t *px;
 static uint32_t width_px, height_px;
 static oc_junction_t found[OC_MAX_JUNCTIONS];
-static int is_listing, only_method = -1, n_frames = -1;
+static int is_listing, is_comparing, only_method = -1, n_frames = -1;
 
 static oc_judoca_params_t params_of(int method)
 {
@@ -112,10 +113,10 @@ static uint64_t add_junction(uint64_t digest, const oc_junction_t *j)
     return digest;
 }
 
-static uint32_t detect(int method, uint32_t times)
+static uint32_t detect(const oc_judoca_params_t *chosen, uint32_t times)
 {
     static oc_judoca_ws_t ws;
-    const oc_judoca_params_t params = params_of(method);
+    const oc_judoca_params_t params = *chosen;
     const oc_image_t image = {px, width_px, height_px, width_px, 1};
     const size_t n_bytes = oc_judoca_size_bytes(width_px, height_px, &params);
     void *block = malloc(n_bytes + 1u);
@@ -136,12 +137,65 @@ static void digest_picture(const char *name)
 {
     for (int method = 0; method < N_METHODS; method++) {
         if (only_method >= 0 && method != only_method) continue;
-        const uint32_t n = detect(method, 1);
+        const oc_judoca_params_t params = params_of(method);
+        const uint32_t n = detect(&params, 1);
         uint64_t digest = 14695981039346656037u;
         for (uint32_t i = 0; i < n; i++) digest = add_junction(digest, &found[i]);
         printf("%s %s %" PRIu32 " %016" PRIx64 "\n", name, method_name[method], n, digest);
     }
 }
+
+/* ---- levels ---- */
+
+#define N_SETTINGS 6
+
+static const char *const setting_name[N_SETTINGS] = {"default",   "lambda 10",        "lambda 15",
+                                                     "lambda 20", "t_b of the noise", "noise added"};
+
+static oc_judoca_params_t params_of_setting(int setting)
+{
+    static const int32_t lambda_px[N_SETTINGS] = {0, 10, 15, 20, 0, 0};
+    oc_judoca_params_t params = oc_judoca_defaults();
+    if (lambda_px[setting] > 0) params.lambda_min_px = params.lambda_px = lambda_px[setting];
+    if (setting == 4) params.t_b = 0.0f;
+    return params;
+}
+
+/* Up to 20 grey levels either way. */
+static void picture_add_noise(void)
+{
+    for (uint32_t i = 0; i < width_px * height_px; i++) {
+        const int32_t level = px[i] + (int32_t)(hash_of(i, 7u) % 41u) - 20;
+        px[i] = (uint8_t)(level < 0 ? 0 : level > 255 ? 255 : level);
+    }
+}
+
+/* Does every level find what the twin finds, bit for bit? The picture is noisy afterwards. */
+static int compare_levels(const char *name)
+{
+    static oc_junction_t of_twin[OC_MAX_JUNCTIONS];
+    uint32_t n_all = 0;
+    int is_same = 1;
+    for (int setting = 0; setting < N_SETTINGS; setting++) {
+        if (setting == N_SETTINGS - 1) picture_add_noise();
+        oc_judoca_params_t params = params_of_setting(setting);
+        params.simd = OC_SIMD_SCALAR;
+        const uint32_t n_twin = detect(&params, 1);
+        memcpy(of_twin, found, sizeof of_twin);
+        n_all += n_twin;
+        for (int level = OC_SIMD_BASE; level <= OC_SIMD_AVX2; level++) {
+            params.simd = (oc_simd_t)level;
+            const uint32_t n = detect(&params, 1);
+            if (n == n_twin && memcmp(of_twin, found, n * sizeof found[0]) == 0) continue;
+            printf("%s, %s: level %d differs from the twin\n", name, setting_name[setting], level);
+            is_same = 0;
+        }
+    }
+    printf("%s: %" PRIu32 " junctions in %d settings\n", name, n_all, N_SETTINGS);
+    return is_same;
+}
+
+/* ---- the program ---- */
 
 /* The file's own name, without its folder. */
 static const char *short_name(const char *path)
@@ -152,7 +206,8 @@ static const char *short_name(const char *path)
 
 static int usage(void)
 {
-    fprintf(stderr, "usage: junction_digest [--list] [--frames N] [--method default|fixed|thesis] [FILE.pgm...]\n");
+    fprintf(stderr,
+            "usage: junction_digest [--list] [--frames N] [--method default|fixed|thesis] [--levels] [FILE.pgm...]\n");
     return 2;
 }
 
@@ -166,11 +221,13 @@ static int find_method(const char *name)
 
 int main(int argc, char **argv)
 {
-    int arg = 1;
+    int arg = 1, is_same = 1;
     uint32_t sum = 0;
     for (; arg < argc && argv[arg][0] == '-'; arg++) {
         if (strcmp(argv[arg], "--list") == 0) {
             is_listing = 1;
+        } else if (strcmp(argv[arg], "--levels") == 0) {
+            is_comparing = 1;
         } else if (strcmp(argv[arg], "--frames") == 0 && arg + 1 < argc) {
             n_frames = (int)strtol(argv[++arg], NULL, 10);
             if (n_frames < 0) return usage();
@@ -183,20 +240,27 @@ int main(int argc, char **argv)
     }
     for (int is_noise = 0; is_noise < 2 && n_frames < 0; is_noise++) {
         picture_make(is_noise);
-        digest_picture(is_noise ? "noise" : "tiles");
+        if (is_comparing) {
+            is_same &= compare_levels(is_noise ? "noise" : "tiles");
+        } else {
+            digest_picture(is_noise ? "noise" : "tiles");
+        }
     }
     for (; arg < argc; arg++) {
         if (!picture_read(argv[arg])) {
             fprintf(stderr, "junction_digest: %s is no PGM of 8 bits\n", argv[arg]);
             return 1;
         }
-        if (n_frames < 0) {
+        if (is_comparing) {
+            is_same &= compare_levels(short_name(argv[arg]));
+        } else if (n_frames < 0) {
             digest_picture(short_name(argv[arg]));
         } else {
-            sum += detect(only_method > 0 ? only_method : 0, (uint32_t)n_frames);
+            const oc_judoca_params_t params = params_of(only_method > 0 ? only_method : 0);
+            sum += detect(&params, (uint32_t)n_frames);
         }
     }
     if (n_frames >= 0) printf("%" PRIu32 "\n", sum);
     free(px);
-    return 0;
+    return is_same ? 0 : 1;
 }

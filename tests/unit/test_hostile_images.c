@@ -172,38 +172,90 @@ static void every_kind_of_picture_of_every_shape_is_survived(void)
     }
 }
 
+#define CELLS 4u
+
+/* Every sixteenth of the picture has its share of the junctions: a quarter of it at least, three times it at most. */
+static void check_spread(uint32_t n, const oc_image_t *image)
+{
+    uint32_t in_cell[CELLS * CELLS] = {0};
+    char text[96];
+    for (uint32_t i = 0; i < n; i++) {
+        const uint32_t col = (uint32_t)found()[i].x_px * CELLS / image->width_px;
+        const uint32_t row = (uint32_t)found()[i].y_px * CELLS / image->height_px;
+        in_cell[row * CELLS + col]++;
+    }
+    for (uint32_t i = 0; i < CELLS * CELLS; i++) {
+        (void)snprintf(text, sizeof text, "%u of %u in cell %u of a picture %u px wide", (unsigned)in_cell[i],
+                       (unsigned)n, (unsigned)i, (unsigned)image->width_px);
+        TEST_ASSERT_TRUE_MESSAGE(in_cell[i] >= n / (CELLS * CELLS) / 4u, text);
+        TEST_ASSERT_TRUE_MESSAGE(in_cell[i] <= n / (CELLS * CELLS) * 3u, text);
+    }
+}
+
 static void the_largest_picture_is_taken(void)
 {
     const oc_judoca_params_t params = oc_judoca_defaults();
-    const oc_image_t image = picture_make(TILES, OC_MAX_IMAGE_SIDE, OC_MAX_IMAGE_SIDE, OC_MAX_IMAGE_SIDE);
-    TEST_ASSERT_EQUAL_UINT32(params.max_junctions, detect(&image, &params, OC_MAX_JUNCTIONS));
-    check_found(params.max_junctions, &image);
+    const kind_t kinds[] = {TILES, SATURATED};
+    for (int k = 0; k < 2; k++) {
+        const oc_image_t image = picture_make(kinds[k], OC_MAX_IMAGE_SIDE, OC_MAX_IMAGE_SIDE, OC_MAX_IMAGE_SIDE);
+        TEST_ASSERT_EQUAL_UINT32(params.max_junctions, detect(&image, &params, OC_MAX_JUNCTIONS));
+        check_found(params.max_junctions, &image);
+        check_spread(params.max_junctions, &image);
+    }
     TEST_ASSERT_EQUAL_size_t(0, oc_judoca_size_bytes(OC_MAX_IMAGE_SIDE + 1u, 64, &params));
     TEST_ASSERT_EQUAL_size_t(0, oc_judoca_size_bytes(64, OC_MIN_IMAGE_SIDE - 1u, &params));
     TEST_ASSERT_EQUAL_size_t(0, oc_judoca_size_bytes(UINT32_MAX, UINT32_MAX, &params));
 }
 
+/* Thousands of corners of one score: none of the limits on the way may take one side of the picture only. */
+static void many_equal_corners_are_kept_all_over_the_picture(void)
+{
+    const oc_judoca_params_t params = oc_judoca_defaults();
+    const uint32_t sides[] = {1024, 2048};
+    const uint32_t squares[][2] = {{23, 19}, {8, 8}, {16, 16}, {32, 32}, {40, 40}, {41, 37}};
+    for (int s = 0; s < 2; s++) {
+        for (int k = 0; k < 6; k++) {
+            const oc_image_t image = picture_make(BLACK, sides[s], sides[s], sides[s]);
+            for (uint32_t y = 0; y < sides[s]; y++) {
+                for (uint32_t x = 0; x < sides[s]; x++) {
+                    picture.bytes[y * sides[s] + x] = x / squares[k][0] % 2u == y / squares[k][1] % 2u ? 255 : 0;
+                }
+            }
+            TEST_ASSERT_EQUAL_UINT32(params.max_junctions, detect(&image, &params, OC_MAX_JUNCTIONS));
+            check_found(params.max_junctions, &image);
+            check_spread(params.max_junctions, &image);
+        }
+    }
+}
+
 /* Noise has junctions everywhere: a cap must not keep one corner of the picture. */
 static void a_cap_is_spread_over_the_picture(void)
 {
-    enum { SIDE = 480, CELLS = 4 };
+    enum { SIDE = 480 };
     const oc_image_t image = picture_make(NOISE, SIDE, SIDE, SIDE);
     oc_judoca_params_t params = oc_judoca_defaults();
     const uint32_t caps[] = {64, 200, 600};
     for (size_t c = 0; c < 3; c++) {
-        uint32_t in_cell[CELLS * CELLS] = {0};
         params.max_junctions = caps[c];
         const uint32_t n = detect(&image, &params, OC_MAX_JUNCTIONS);
         TEST_ASSERT_EQUAL_UINT32(caps[c], n);
-        for (uint32_t i = 0; i < n; i++) {
-            const uint32_t col = (uint32_t)found()[i].x_px * CELLS / SIDE,
-                           row = (uint32_t)found()[i].y_px * CELLS / SIDE;
-            in_cell[row * CELLS + col]++;
-        }
-        for (uint32_t i = 0; i < CELLS * CELLS; i++) {
-            TEST_ASSERT_TRUE(in_cell[i] >= caps[c] / (CELLS * CELLS) / 4u); /* a quarter of its fair share */
-            TEST_ASSERT_TRUE(in_cell[i] <= caps[c] / (CELLS * CELLS) * 3u);
-        }
+        check_spread(n, &image);
+    }
+}
+
+/* Neither may the limit on the fits. */
+static void a_limit_on_the_fits_is_spread_over_the_picture(void)
+{
+    enum { SIDE = 512 };
+    oc_judoca_params_t params = oc_judoca_defaults();
+    const kind_t kinds[] = {NOISE, TILES, SATURATED};
+    const uint32_t limits[] = {1000, 200, 800}; /* of noise few make a junction, and a corner has several places */
+    for (int k = 0; k < 3; k++) {
+        const oc_image_t image = picture_make(kinds[k], SIDE, SIDE, SIDE);
+        params.max_candidates = limits[k];
+        const uint32_t n = detect(&image, &params, OC_MAX_JUNCTIONS);
+        TEST_ASSERT_TRUE(n >= 64 && n < params.max_candidates);
+        check_spread(n, &image);
     }
 }
 
@@ -303,7 +355,9 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(every_kind_of_picture_of_every_shape_is_survived);
     RUN_TEST(the_largest_picture_is_taken);
+    RUN_TEST(many_equal_corners_are_kept_all_over_the_picture);
     RUN_TEST(a_cap_is_spread_over_the_picture);
+    RUN_TEST(a_limit_on_the_fits_is_spread_over_the_picture);
     RUN_TEST(frames_that_are_none_are_refused);
     RUN_TEST(every_kind_of_frame_passes_through_the_vehicle);
     return UNITY_END();
