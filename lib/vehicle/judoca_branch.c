@@ -141,15 +141,15 @@ static bool branch_shorten(const oc_kernels_t *kernels, const oc_fit_rules_t *ru
     return false;
 }
 
-bool oc_judoca_branch_follow(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit,
-                             const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur, uint32_t i,
-                             const oc_fit_span_t *span, oc_fit_branch_t *branch)
+bool oc_judoca_branch_follow(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, oc_fit_t *fit,
+                             const oc_fit_blur_t *blur, uint32_t i, const oc_fit_span_t *span)
 {
+    oc_fit_branch_t *branch = &fit->branch[i];
     const oc_fit_walk_t walk = walk_make(gradient, rules, fit, i, branch, span);
     if (walk.n < MIN_SAMPLES) return false;
 
     oc_fit_profile_t profile;
-    gradient->kernels->follow(&walk, crowd, blur, &profile, &branch->sums);
+    gradient->kernels->follow(&walk, &fit->crowd, blur, &profile, &branch->sums);
 
     const uint32_t n_short = profile.n_short < MIN_SAMPLES ? MIN_SAMPLES : profile.n_short;
     const float tolerant_px = LEAST_LENGTH * span->asked_px, strict_px = span->asked_px - 1.5f;

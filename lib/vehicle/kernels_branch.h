@@ -12,6 +12,7 @@
 #include "vehicle/simd.h"
 
 #define KERNEL_INLINE static inline __attribute__((always_inline))
+#define KERNEL_APART static __attribute__((noinline))
 
 #define LANES ((int32_t)OC_LANES)
 
@@ -215,8 +216,9 @@ KERNEL_INLINE void ridge_level(const oc_fit_walk_t *walk, const oc_fit_blur_t *b
 
 /* Leave of the ridge what the branch would show if it were alone and had no end. */
 KERNEL_INLINE void ridge_alone(const oc_fit_walk_t *walk, const kernel_rivals_t *rivals, const oc_fit_blur_t *blur,
-                               float from_px, kernel_ridge_t *ridge)
+                               int32_t m, kernel_ridge_t *ridge)
 {
+    const float from_px = ((float)(walk->first + walk->sign * m) - walk->a_major) * walk->per_major;
     uint32_t rest = rivals->which & oc_bits_of_lanes(lanes_load(rivals->reach) > from_px);
     for (; rest; rest &= rest - 1u) ridge_clear(rivals, (uint32_t)__builtin_ctz(rest), ridge);
     if (from_px < 3.0f * blur->st + 1.0f) ridge_level(walk, blur, ridge);
@@ -319,35 +321,58 @@ static void kernel_sums(const oc_fit_profile_t *profile, uint32_t places, float 
 
 /* ---- a branch ---- */
 
-KERNEL_INLINE void follow_reach(const oc_fit_walk_t *walk, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur,
-                                oc_fit_profile_t *out, oc_fit_sums_t *sums, const int32_t reach,
+KERNEL_INLINE void block_follow(const oc_fit_walk_t *walk, const kernel_rivals_t *rivals, const oc_fit_blur_t *blur,
+                                int32_t m, oc_fit_profile_t *out, kernel_marks_t *marks, const int32_t reach,
                                 const bool has_model)
 {
-    kernel_marks_t marks = {0};
-    kernel_rivals_t rivals;
-    if (has_model) rivals_find(walk, crowd, blur, &rivals);
-    const int32_t n = (int32_t)walk->n;
-    for (int32_t m = 0; m < n; m += LANES) {
-        const float from_px = ((float)(walk->first + walk->sign * m) - walk->a_major) * walk->per_major;
-        kernel_ridge_t ridge;
-        ridge_take(walk, m, &ridge, reach);
-        if (has_model) ridge_alone(walk, &rivals, blur, from_px, &ridge);
-        /* Without a search the ridge may be nearer to the next pixel. */
-        ridge_peak(walk, &ridge, blur, reach == 0 ? 1.0f : 0.51f, m, out, &marks);
-    }
-    profile_pick(walk, &marks, out);
-    sums_take(out, out->place, walk->far_px, sums);
+    kernel_ridge_t ridge;
+    ridge_take(walk, m, &ridge, reach);
+    if (has_model) ridge_alone(walk, rivals, blur, m, &ridge);
+    /* Without a search the ridge may be nearer to the next pixel. */
+    ridge_peak(walk, &ridge, blur, reach == 0 ? 1.0f : 0.51f, m, out, marks);
+}
+
+/* One function each: in a loop the compiler would keep constants for a second turn that seldom comes. */
+KERNEL_APART void block_first(const oc_fit_walk_t *walk, const kernel_rivals_t *rivals, const oc_fit_blur_t *blur,
+                              int32_t m, oc_fit_profile_t *out, kernel_marks_t *marks)
+{
+    block_follow(walk, rivals, blur, m, out, marks, OC_FIT_MAX_REACH, false);
+}
+
+KERNEL_APART void block_on_line(const oc_fit_walk_t *walk, const kernel_rivals_t *rivals, const oc_fit_blur_t *blur,
+                                int32_t m, oc_fit_profile_t *out, kernel_marks_t *marks)
+{
+    block_follow(walk, rivals, blur, m, out, marks, 0, true);
+}
+
+KERNEL_APART void block_beside(const oc_fit_walk_t *walk, const kernel_rivals_t *rivals, const oc_fit_blur_t *blur,
+                               int32_t m, oc_fit_profile_t *out, kernel_marks_t *marks)
+{
+    block_follow(walk, rivals, blur, m, out, marks, 1, true);
+}
+
+KERNEL_APART void block_around(const oc_fit_walk_t *walk, const kernel_rivals_t *rivals, const oc_fit_blur_t *blur,
+                               int32_t m, oc_fit_profile_t *out, kernel_marks_t *marks)
+{
+    block_follow(walk, rivals, blur, m, out, marks, OC_FIT_MAX_REACH, true);
 }
 
 static void kernel_follow(const oc_fit_walk_t *walk, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur,
                           oc_fit_profile_t *out, oc_fit_sums_t *sums)
 {
-    switch (walk->has_model ? walk->reach : -1) {
-    case -1: follow_reach(walk, crowd, blur, out, sums, OC_FIT_MAX_REACH, false); break;
-    case 0: follow_reach(walk, crowd, blur, out, sums, 0, true); break;
-    case 1: follow_reach(walk, crowd, blur, out, sums, 1, true); break;
-    default: follow_reach(walk, crowd, blur, out, sums, OC_FIT_MAX_REACH, true); break;
+    kernel_marks_t marks = {0};
+    kernel_rivals_t rivals;
+    rivals_find(walk, crowd, blur, &rivals);
+    for (int32_t m = 0; m < (int32_t)walk->n; m += LANES) {
+        switch (walk->has_model ? walk->reach : -1) {
+        case -1: block_first(walk, &rivals, blur, m, out, &marks); break;
+        case 0: block_on_line(walk, &rivals, blur, m, out, &marks); break;
+        case 1: block_beside(walk, &rivals, blur, m, out, &marks); break;
+        default: block_around(walk, &rivals, blur, m, out, &marks); break;
+        }
     }
+    profile_pick(walk, &marks, out);
+    sums_take(out, out->place, walk->far_px, sums);
 }
 
 static void kernel_acute(const oc_fit_crowd_t *crowd, float cot[OC_FIT_MAX_BRANCHES])
