@@ -140,22 +140,38 @@ static bool branch_shorten(const oc_kernels_t *kernels, const oc_fit_rules_t *ru
     return false;
 }
 
-bool oc_judoca_branch_follow(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, oc_fit_t *fit,
-                             const oc_fit_blur_t *blur, uint32_t i, const oc_fit_span_t *span)
+/* Does a branch hold as it was followed? */
+static bool branch_judge(const oc_kernels_t *kernels, const oc_fit_rules_t *rules, const oc_fit_profile_t *profile,
+                         float asked_px, oc_fit_branch_t *branch)
 {
-    oc_fit_branch_t *branch = &fit->branch[i];
-    oc_fit_walk_t walk;
-    walk_make(gradient, rules, fit, i, span, &walk);
-    if (walk.n < MIN_SAMPLES) return false;
-
-    oc_fit_profile_t profile;
-    gradient->kernels->follow(&walk, &fit->crowd, blur, &profile, &branch->sums);
-
-    const uint32_t n_short = profile.n_short < MIN_SAMPLES ? MIN_SAMPLES : profile.n_short;
-    const float tolerant_px = LEAST_LENGTH * span->asked_px, strict_px = span->asked_px - 1.5f;
+    const uint32_t n_short = profile->n_short < MIN_SAMPLES ? MIN_SAMPLES : profile->n_short;
+    const float tolerant_px = LEAST_LENGTH * asked_px, strict_px = asked_px - 1.5f;
     const float least_px = tolerant_px < strict_px ? tolerant_px : strict_px;
     const bool is_line = branch_solve(branch);
     if (!((branch->sums.n >= n_short) & (branch->sums.last_px >= least_px) & is_line)) return false;
     if (branch_holds(branch, rules, n_short)) return branch_shows(branch, rules);
-    return branch_shorten(gradient->kernels, rules, &profile, n_short, least_px, branch);
+    return branch_shorten(kernels, rules, profile, n_short, least_px, branch);
+}
+
+uint32_t oc_judoca_branches_follow(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, oc_fit_t *fit,
+                                   const oc_fit_blur_t *blur, uint32_t which, const oc_fit_span_t span[])
+{
+    oc_fit_track_t track[OC_FIT_MAX_BRANCHES];
+    uint32_t n = 0, branch[OC_FIT_MAX_BRANCHES], holds = 0;
+    for (uint32_t rest = which; rest; rest &= rest - 1u) {
+        const uint32_t i = (uint32_t)__builtin_ctz(rest);
+        walk_make(gradient, rules, fit, i, &span[i], &track[n].walk);
+        track[n].sums = &fit->branch[i].sums;
+        branch[n] = i;
+        n += track[n].walk.n >= MIN_SAMPLES;
+    }
+    if (n == 0) return 0;
+    gradient->kernels->follow(track, n, &fit->crowd, blur);
+    for (uint32_t k = 0; k < n; k++) {
+        const uint32_t i = branch[k];
+        const bool is_held =
+            branch_judge(gradient->kernels, rules, &track[k].profile, span[i].asked_px, &fit->branch[i]);
+        holds |= (uint32_t)is_held << i;
+    }
+    return holds;
 }

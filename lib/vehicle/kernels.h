@@ -112,6 +112,13 @@ typedef struct oc_fit_sums {
     float last_px;     /* t of the last position */
 } oc_fit_sums_t;
 
+/* One branch on its way through the kernel. */
+typedef struct oc_fit_track {
+    oc_fit_walk_t walk; /* with samples */
+    oc_fit_profile_t profile;
+    oc_fit_sums_t *sums; /* out */
+} oc_fit_track_t;
+
 /* Round the apex: derivatives across OC_RAYS directions. */
 #define OC_RING_SAMPLES 5u
 typedef struct oc_ring_table {
@@ -156,10 +163,9 @@ typedef struct oc_kernels {
     /* Cotangent of the angle to the nearest other branch, for each; 0 without an acute angle. */
     void (*acute)(const oc_fit_crowd_t *crowd, float cot[OC_FIT_MAX_BRANCHES]);
 
-    /* Ridge positions along a branch, what the others add to its derivative near the apex taken off, and the sums over
-     * them. */
-    void (*follow)(const oc_fit_walk_t *walk, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur,
-                   oc_fit_profile_t *out, oc_fit_sums_t *sums);
+    /* Ridge positions along n branches of one crowd, what the others add to its derivative near the apex taken off, and
+     * the sums over them. All have a model or none. */
+    void (*follow)(oc_fit_track_t track[], uint32_t n, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur);
 
     /* Sums over some positions, bit m = sample m, at least one. */
     void (*sums)(const oc_fit_profile_t *profile, uint32_t places, float far_px, oc_fit_sums_t *sums);

@@ -12,7 +12,6 @@
 #include "vehicle/simd.h"
 
 #define KERNEL_INLINE static inline __attribute__((always_inline))
-#define KERNEL_APART static __attribute__((noinline))
 
 #define LANES ((int32_t)OC_LANES)
 
@@ -234,8 +233,10 @@ typedef struct kernel_marks {
 
 /* Vertex of the parabola through the three taps, put right for a Gaussian. */
 KERNEL_INLINE void ridge_peak(const oc_fit_walk_t *walk, const kernel_ridge_t *ridge, const oc_fit_blur_t *blur,
-                              const float most, int32_t m, oc_fit_profile_t *out, kernel_marks_t *marks)
+                              int32_t m, oc_fit_profile_t *out, kernel_marks_t *marks)
 {
+    /* Without a search the ridge may be nearer to the next pixel. */
+    const float most = walk->reach == 0 ? 1.0f : 0.51f;
     const float inv_s2 = walk->own_major * walk->own_major * blur->inv_s2; /* along the minor axis */
     const float gain = inv_s2 * (0.25f + (1.0f / 24.0f) * inv_s2);
     const oc_lanes_t middle = ridge->middle;
@@ -321,58 +322,48 @@ static void kernel_sums(const oc_fit_profile_t *profile, uint32_t places, float 
 
 /* ---- a branch ---- */
 
-KERNEL_INLINE void block_follow(const oc_fit_walk_t *walk, const kernel_rivals_t *rivals, const oc_fit_blur_t *blur,
-                                int32_t m, oc_fit_profile_t *out, kernel_marks_t *marks, const int32_t reach,
-                                const bool has_model)
+/* Samples m .. m + 7 of all branches that have them. */
+KERNEL_INLINE void tracks_take(const oc_fit_track_t track[], uint32_t n, int32_t m, kernel_ridge_t ridge[])
 {
-    kernel_ridge_t ridge;
-    ridge_take(walk, m, &ridge, reach);
-    if (has_model) ridge_alone(walk, rivals, blur, m, &ridge);
-    /* Without a search the ridge may be nearer to the next pixel. */
-    ridge_peak(walk, &ridge, blur, reach == 0 ? 1.0f : 0.51f, m, out, marks);
-}
-
-/* One function each: in a loop the compiler would keep constants for a second turn that seldom comes. */
-KERNEL_APART void block_first(const oc_fit_walk_t *walk, const kernel_rivals_t *rivals, const oc_fit_blur_t *blur,
-                              int32_t m, oc_fit_profile_t *out, kernel_marks_t *marks)
-{
-    block_follow(walk, rivals, blur, m, out, marks, OC_FIT_MAX_REACH, false);
-}
-
-KERNEL_APART void block_on_line(const oc_fit_walk_t *walk, const kernel_rivals_t *rivals, const oc_fit_blur_t *blur,
-                                int32_t m, oc_fit_profile_t *out, kernel_marks_t *marks)
-{
-    block_follow(walk, rivals, blur, m, out, marks, 0, true);
-}
-
-KERNEL_APART void block_beside(const oc_fit_walk_t *walk, const kernel_rivals_t *rivals, const oc_fit_blur_t *blur,
-                               int32_t m, oc_fit_profile_t *out, kernel_marks_t *marks)
-{
-    block_follow(walk, rivals, blur, m, out, marks, 1, true);
-}
-
-KERNEL_APART void block_around(const oc_fit_walk_t *walk, const kernel_rivals_t *rivals, const oc_fit_blur_t *blur,
-                               int32_t m, oc_fit_profile_t *out, kernel_marks_t *marks)
-{
-    block_follow(walk, rivals, blur, m, out, marks, OC_FIT_MAX_REACH, true);
-}
-
-static void kernel_follow(const oc_fit_walk_t *walk, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur,
-                          oc_fit_profile_t *out, oc_fit_sums_t *sums)
-{
-    kernel_marks_t marks = {0};
-    kernel_rivals_t rivals;
-    rivals_find(walk, crowd, blur, &rivals);
-    for (int32_t m = 0; m < (int32_t)walk->n; m += LANES) {
-        switch (walk->has_model ? walk->reach : -1) {
-        case -1: block_first(walk, &rivals, blur, m, out, &marks); break;
-        case 0: block_on_line(walk, &rivals, blur, m, out, &marks); break;
-        case 1: block_beside(walk, &rivals, blur, m, out, &marks); break;
-        default: block_around(walk, &rivals, blur, m, out, &marks); break;
+    for (uint32_t i = 0; i < n; i++) {
+        const oc_fit_walk_t *walk = &track[i].walk;
+        if ((int32_t)walk->n <= m) continue;
+        switch (walk->reach) {
+        case 0: ridge_take(walk, m, &ridge[i], 0); break;
+        case 1: ridge_take(walk, m, &ridge[i], 1); break;
+        default: ridge_take(walk, m, &ridge[i], OC_FIT_MAX_REACH); break;
         }
     }
-    profile_pick(walk, &marks, out);
-    sums_take(out, out->place, walk->far_px, sums);
+}
+
+/* Step by step for all branches: they do not depend on each other, so one fills the waits of another. */
+static void kernel_follow(oc_fit_track_t track[], uint32_t n, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur)
+{
+    kernel_ridge_t ridge[OC_FIT_MAX_BRANCHES];
+    kernel_rivals_t rivals[OC_FIT_MAX_BRANCHES];
+    kernel_marks_t marks[OC_FIT_MAX_BRANCHES];
+    int32_t most = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        marks[i] = (kernel_marks_t){0, 0, 0, 0, 0};
+        most = most > (int32_t)track[i].walk.n ? most : (int32_t)track[i].walk.n;
+    }
+    const bool has_model = track[0].walk.has_model;
+    for (uint32_t i = 0; i < n && has_model; i++) rivals_find(&track[i].walk, crowd, blur, &rivals[i]);
+    for (int32_t m = 0; m < most; m += LANES) {
+        tracks_take(track, n, m, ridge);
+        for (uint32_t i = 0; i < n && has_model; i++) {
+            if ((int32_t)track[i].walk.n > m) ridge_alone(&track[i].walk, &rivals[i], blur, m, &ridge[i]);
+        }
+        for (uint32_t i = 0; i < n; i++) {
+            if ((int32_t)track[i].walk.n > m) {
+                ridge_peak(&track[i].walk, &ridge[i], blur, m, &track[i].profile, &marks[i]);
+            }
+        }
+    }
+    for (uint32_t i = 0; i < n; i++) {
+        profile_pick(&track[i].walk, &marks[i], &track[i].profile);
+        sums_take(&track[i].profile, track[i].profile.place, track[i].walk.far_px, track[i].sums);
+    }
 }
 
 static void kernel_acute(const oc_fit_crowd_t *crowd, float cot[OC_FIT_MAX_BRANCHES])
