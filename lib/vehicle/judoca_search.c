@@ -164,55 +164,43 @@ static void ring_clear(const oc_search_t *search, uint64_t *ring, uint32_t used[
     used[slot] = 0;
 }
 
-/* Where the pixels of one column and row go: plane 0 of the column, and the tiles. */
-typedef struct insert {
-    uint64_t *left, *mid, *right;
-    uint16_t *tile;
-    size_t pitch;
-    uint32_t used, left_used, right_used;
-} insert_t;
-
-/* One pixel of B+, and its neighbours across the edge. */
-static inline void insert_pixel(insert_t *to, uint32_t bit, uint32_t y, int32_t dx, int32_t dy)
-{
-    const uint32_t d = direction_of(dx, dy);
-    const size_t at = d * to->pitch + OC_BITMAP_BORDER + y;
-    const uint64_t here = (uint64_t)1 << bit;
-    const bool upright = (dx < 0 ? -dx : dx) > (dy < 0 ? -dy : dy);
-    const uint64_t beside = upright ? here << 1 | here >> 1 : 0, above = upright ? 0 : here;
-    to->used |= 1u << d;
-    to->tile[bit / TILE_PX] |= (uint16_t)(1u << d % 16u);
-    to->mid[at - 1] |= above;
-    to->mid[at] |= here | beside;
-    to->mid[at + 1] |= above;
-    if (bit == 0 && upright) {
-        to->left[at] |= (uint64_t)1 << 63;
-        to->left_used |= 1u << d;
-    } else if (bit == 63 && upright) {
-        to->right[at] |= 1;
-        to->right_used |= 1u << d;
-    }
-}
-
 static void search_insert(oc_search_t *search, const oc_gradient_t *gradient, int32_t column)
 {
     ring_clear(search, search->edge, search->edge_used, column + 1);
     const uint64_t *thin = gradient->thin + oc_bitmap_at(gradient->pitch, (uint32_t)column, 0);
-    insert_t to = {.left = ring_plane(search, search->edge, column - 1, 0),
-                   .mid = ring_plane(search, search->edge, column, 0),
-                   .right = ring_plane(search, search->edge, column + 1, 0),
-                   .pitch = search->pitch};
-    for (uint32_t y = 0; y < gradient->height_px; y++) {
+    uint64_t *left = ring_plane(search, search->edge, column - 1, 0);
+    uint64_t *mid = ring_plane(search, search->edge, column, 0);
+    uint64_t *right = ring_plane(search, search->edge, column + 1, 0);
+    uint16_t *tiles = search->tile + tile_pitch(search->n_columns) + 8u * ((uint32_t)column + 1u);
+    const uint32_t pitch = search->pitch, tiles_pitch = tile_pitch(search->n_columns), height = gradient->height_px;
+    uint32_t used = 0, left_used = 0, right_used = 0;
+    for (uint32_t y = 0; y < height; y++) {
         const int16_t *row = gradient->dxdy + 2u * ((size_t)y * gradient->width_px + 64u * (uint32_t)column);
-        to.tile = search->tile + (y / TILE_PX + 1u) * tile_pitch(search->n_columns) + 8u * ((uint32_t)column + 1u);
         for (uint64_t rest = thin[y]; rest; rest &= rest - 1u) {
             const uint32_t bit = (uint32_t)__builtin_ctzll(rest);
-            insert_pixel(&to, bit, y, row[2u * bit], row[2u * bit + 1u]);
+            const int32_t dx = row[2u * bit], dy = row[2u * bit + 1u];
+            const uint32_t d = direction_of(dx, dy);
+            /* The pixel and its neighbours across the edge. */
+            const size_t at = (size_t)d * pitch + OC_BITMAP_BORDER + y;
+            const uint64_t here = (uint64_t)1 << bit;
+            const uint64_t upright = (dx < 0 ? -dx : dx) > (dy < 0 ? -dy : dy) ? UINT64_MAX : 0;
+            mid[at - 1] |= here & ~upright;
+            mid[at] |= here | ((here << 1 | here >> 1) & upright);
+            mid[at + 1] |= here & ~upright;
+            used |= 1u << d;
+            tiles[y / TILE_PX * tiles_pitch + bit / TILE_PX] |= (uint16_t)(1u << d % 16u);
+            if (bit == 0 && upright) {
+                left[at] |= (uint64_t)1 << 63;
+                left_used |= 1u << d;
+            } else if (bit == 63 && upright) {
+                right[at] |= 1;
+                right_used |= 1u << d;
+            }
         }
     }
-    search->edge_used[ring_slot(column - 1)] |= to.left_used;
-    search->edge_used[ring_slot(column)] |= to.used;
-    search->edge_used[ring_slot(column + 1)] |= to.right_used;
+    search->edge_used[ring_slot(column - 1)] |= left_used;
+    search->edge_used[ring_slot(column)] |= used;
+    search->edge_used[ring_slot(column + 1)] |= right_used;
 }
 
 /* ---- spread ---- */

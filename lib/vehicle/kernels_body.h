@@ -11,7 +11,7 @@
 #include <string.h>
 
 #include "vehicle/kernels.h"
-#include "vehicle/kernels_branch.h"
+#include "vehicle/kernels_branch_body.h"
 #include "vehicle/simd.h"
 
 /* tan 22.5 degrees in 1/128: which neighbours lie along a gradient. */
@@ -247,19 +247,33 @@ KERNEL_INLINE oc_words_t ray_too_many(uint32_t n_spare, oc_words_t ones, oc_word
     return carry;
 }
 
+/* Sample s of all rays of one direction. */
+KERNEL_INLINE oc_words_t ray_sample(const oc_ray_table_t *table, uint32_t direction, uint32_t s, const uint64_t *side,
+                                    const uint64_t *mid, bool is_left)
+{
+    const int32_t dx = table->dx[direction][s], dy = table->dy[direction][s];
+    return is_left ? ray_to_left(mid + dy, side + dy, -dx) : ray_to_right(mid + dy, side + dy, dx);
+}
+
 /* Most rays end at the first sample; which of the others do is not worth a branch. */
 KERNEL_INLINE oc_words_t ray_follow(const oc_ray_table_t *table, uint32_t direction, const uint64_t *side,
                                     const uint64_t *mid, bool is_left, oc_words_t alive, oc_words_t *whole,
-                                    const uint32_t n_spare)
+                                    const uint32_t n_samples, const uint32_t n_spare)
 {
-    const int8_t *dx = table->dx[direction], *dy = table->dy[direction];
-    oc_words_t ones = {0}, twos = {0};
-    alive &= is_left ? ray_to_left(mid + dy[0], side + dy[0], -dx[0]) : ray_to_right(mid + dy[0], side + dy[0], dx[0]);
+    alive &= ray_sample(table, direction, 0, side, mid, is_left);
     *whole = alive;
     if (!oc_words_any(&alive)) return alive;
-    for (uint32_t s = 1; s < table->n_samples; s++) {
-        const oc_words_t miss = ~(is_left ? ray_to_left(mid + dy[s], side + dy[s], -dx[s])
-                                          : ray_to_right(mid + dy[s], side + dy[s], dx[s]));
+    if (n_samples == 5 && n_spare == 2) { /* two of four */
+        const oc_words_t a = ray_sample(table, direction, 1, side, mid, is_left);
+        const oc_words_t b = ray_sample(table, direction, 2, side, mid, is_left);
+        const oc_words_t c = ray_sample(table, direction, 3, side, mid, is_left);
+        const oc_words_t e = ray_sample(table, direction, 4, side, mid, is_left);
+        *whole = alive & (a & b) & (c & e);
+        return alive & ((a & b) | (c & e) | ((a | b) & (c | e)));
+    }
+    oc_words_t ones = {0}, twos = {0};
+    for (uint32_t s = 1; s < n_samples; s++) {
+        const oc_words_t miss = ~ray_sample(table, direction, s, side, mid, is_left);
         const oc_words_t up = ones & miss;
         ones ^= miss;
         const oc_words_t carry = twos & up;
@@ -285,7 +299,8 @@ KERNEL_INLINE oc_words_t rays_paired(const oc_words_t holds[OC_RAYS])
 
 KERNEL_INLINE void rays_follow(const oc_ray_table_t *table, const uint64_t *const left[OC_RAYS],
                                const uint64_t *const mid[OC_RAYS], const uint64_t *const right[OC_RAYS], uint32_t live,
-                               const uint64_t wanted[4], oc_ray_block_t *block, const uint32_t n_spare)
+                               const uint64_t wanted[4], oc_ray_block_t *block, const uint32_t n_samples,
+                               const uint32_t n_spare)
 {
     const oc_words_t start = words_load(wanted), none = {0};
     oc_words_t holds[OC_RAYS], wholes[OC_RAYS], any = none;
@@ -295,8 +310,9 @@ KERNEL_INLINE void rays_follow(const oc_ray_table_t *table, const uint64_t *cons
             const uint32_t p = ray_plane(r);
             oc_words_t alive = none, whole = none;
             if (live >> p & 1u) {
-                alive = table->dx[d][0] < 0 ? ray_follow(table, d, left[p], mid[p], true, start, &whole, n_spare)
-                                            : ray_follow(table, d, right[p], mid[p], false, start, &whole, n_spare);
+                alive = table->dx[d][0] < 0
+                            ? ray_follow(table, d, left[p], mid[p], true, start, &whole, n_samples, n_spare)
+                            : ray_follow(table, d, right[p], mid[p], false, start, &whole, n_samples, n_spare);
             }
             memcpy(block->ray[r], &alive, sizeof alive);
             holds[d] |= alive;
@@ -314,11 +330,11 @@ static void kernel_rays(const oc_ray_table_t *table, const uint64_t *const left[
                         const uint64_t *const mid[OC_RAYS], const uint64_t *const right[OC_RAYS], uint32_t live,
                         const uint64_t wanted[4], oc_ray_block_t *block)
 {
-    switch (table->n_spare) {
-    case 0: rays_follow(table, left, mid, right, live, wanted, block, 0); break;
-    case 1: rays_follow(table, left, mid, right, live, wanted, block, 1); break;
-    case 2: rays_follow(table, left, mid, right, live, wanted, block, 2); break;
-    default: rays_follow(table, left, mid, right, live, wanted, block, 3); break;
+    const uint32_t n = table->n_samples;
+    if (n == 5 && table->n_spare == 2) {
+        rays_follow(table, left, mid, right, live, wanted, block, 5, 2);
+    } else {
+        rays_follow(table, left, mid, right, live, wanted, block, n, table->n_spare);
     }
 }
 
