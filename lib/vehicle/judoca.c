@@ -250,6 +250,11 @@ static bool done_test_and_set(const oc_judoca_ws_t *ws, float x, float y)
     return is_done;
 }
 
+static bool done_test(const oc_judoca_ws_t *ws, uint32_t x, uint32_t y)
+{
+    return ws->done[oc_bitmap_at(ws->gradient.pitch, x / 64u, y)] >> x % 64u & 1u;
+}
+
 /* What leads to within two pixels of a junction would find it again. */
 static void done_surround(const oc_judoca_ws_t *ws, float x_px, float y_px)
 {
@@ -265,6 +270,7 @@ static void done_surround(const oc_judoca_ws_t *ws, float x_px, float y_px)
  * fitted once. */
 static bool fit_place(oc_judoca_ws_t *ws, const oc_fit_rules_t *rules, const oc_place_t *place)
 {
+    if (done_test(ws, place->x, place->y)) return false;
     oc_fit_seed_t seed[OC_FIT_MAX_BRANCHES];
     uint32_t n = seeds_of_side(place->left, 1.0f, seed, 0);
     n = seeds_of_side(place->right, -1.0f, seed, n);
