@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Puts what the bench's programs wrote into docs/: bench.json, pictures/bench_*.svg, its part of measurements.md.
 
-tools/bench_report.py --from DIR [--skipped NAME]...   DIR: accuracy.json, repeatability.json, thesis.json, ...
+tools/bench_report.py --from DIR                       DIR: accuracy.json, repeatability.json, thesis.json, ...
 tools/bench_report.py --from DIR --print               the bench's part to standard output, docs/ is left alone
 tools/bench_report.py                                  writes pictures and measurements.md again from docs/bench.json
 tools/bench_report.py --check                          exit 1 unless docs are what bench.json and measurements.json make
@@ -23,7 +23,8 @@ import bench_plot  # noqa: E402
 import measure_document  # noqa: E402
 
 DOCS = pathlib.Path(__file__).resolve().parent.parent / "docs"
-PARTS = ["accuracy", "repeatability", "thesis", "chess-stereo", "ground"]  # written by our programs: {"seed", "result"}
+PARTS = ["accuracy", "repeatability", "thesis", "chess-stereo"]  # {"seed", "result"}
+PLAIN = ["speed", "instructions", "ground_labels", "ground_speed", "ground_table"]
 
 
 def machine():
@@ -42,17 +43,21 @@ def rounded(value):
     return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
-def gather(folder, skipped):
-    bench = {"machine": machine(), "skipped": skipped}
+def gather(folder):
+    bench = {"machine": machine()}
     for name in PARTS:
         file = folder / f"{name}.json"
         if file.is_file():
             given = json.loads(file.read_text())
             bench.setdefault("seed", given.get("seed"))
             bench[name] = rounded(given["result"])
-    if (folder / "speed.json").is_file():  # Google Benchmark's own form; its context names the machine and the folder
-        given = json.loads((folder / "speed.json").read_text())
-        bench["speed"] = {"benchmarks": rounded(given["benchmarks"])}
+    for name in PLAIN:
+        file = folder / f"{name}.json"
+        if file.is_file():
+            bench[name] = rounded(json.loads(file.read_text()))
+    if (folder / "rivals.json").is_file():  # Google Benchmark's form, whose context names the machine and the folder
+        entries = json.loads((folder / "rivals.json").read_text())["benchmarks"]
+        bench["rivals"] = [{"name": e["name"], "ms": rounded(e["cpu_time"])} for e in entries]
     if "seed" not in bench:
         sys.exit(f"bench_report: nothing measured in {folder}")
     return bench
@@ -80,12 +85,11 @@ def documents(bench):
 def main():
     parser = argparse.ArgumentParser(description="Writes the bench's figures into docs/.")
     parser.add_argument("--from", dest="source", type=pathlib.Path, metavar="DIR", help="what the programs wrote")
-    parser.add_argument("--skipped", action="append", default=[], metavar="NAME", help="a program that was not there")
     parser.add_argument("--print", action="store_true", help="to standard output; docs/ is left alone")
     parser.add_argument("--check", action="store_true", help="compare only; exit 1 when docs are not up to date")
     options = parser.parse_args()
     stored = DOCS / "bench.json"
-    bench = gather(options.source, options.skipped) if options.source else json.loads(stored.read_text())
+    bench = gather(options.source) if options.source else json.loads(stored.read_text())
     if options.print:
         print(bench_document.text(bench))
         return 0

@@ -112,8 +112,8 @@ oc_status_t oc_judoca_init(oc_judoca_ws_t *ws, oc_arena_t *arena, uint32_t width
         if (status != OC_OK) return status;
     }
     ws->params = *params;
-    oc_judoca_ring_build(&ws->ring[0], 3);
-    oc_judoca_ring_build(&ws->ring[1], 6);
+    oc_judoca_ring_build(&ws->ring[0], 3, width_px);
+    oc_judoca_ring_build(&ws->ring[1], 6, width_px);
     ws->done = piece[0];
     ws->found = piece[1];
     ws->rank = piece[2];

@@ -15,151 +15,147 @@
 #define LEAST_CONTRAST 0.7f
 #define LEAST_DERIVATIVE 0.5f
 
-/* A ridge further off than this many of its widths adds nothing. */
-#define RIVAL_WIDTHS 3.0f
-
 /* Share of the shortest length at which the last position may lie: noise hides single ones. */
 #define LEAST_LENGTH 0.8f
 
 /* A branch is taken beyond its shortest length only while it stays this straight. */
 #define GROW_RMS_PX 0.25f
 
-/* Samples along a branch, cut to the image. */
-static oc_fit_walk_t walk_make(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit,
-                               const oc_fit_branch_t *branch, const oc_fit_span_t *span)
+/* Least integer not below x; without a call and without a branch. */
+static inline int32_t ceiling(float x)
 {
-    const float ux = branch->ux, uy = branch->uy;
-    const bool flat = fabsf(ux) >= fabsf(uy);
-    const int32_t width = (int32_t)gradient->width_px, height = (int32_t)gradient->height_px;
-    const float major = flat ? ux : uy;
+    const int32_t towards_zero = (int32_t)x;
+    return towards_zero + (int32_t)(x > (float)towards_zero);
+}
+
+/* Nearest integer of a number above -2^15. */
+static inline int32_t nearest(float x)
+{
+    return (int32_t)(x + 32768.5f) - 32768;
+}
+
+static inline int32_t least(int32_t a, int32_t b)
+{
+    return a < b ? a : b;
+}
+
+/* Where the samples of a branch are, cut to the image. Which axis is major and which way it goes is as good as
+ * random: values are picked from tables and signs multiplied, so that no branch of code depends on it. */
+static void walk_place(const oc_gradient_t *gradient, const oc_fit_t *fit, const oc_fit_branch_t *branch,
+                       const oc_fit_span_t *span, uint32_t axis, oc_fit_walk_t *walk)
+{
+    const int32_t size[2] = {(int32_t)gradient->width_px, (int32_t)gradient->height_px};
+    const int32_t step[2] = {1, (int32_t)gradient->width_px};
+    const float u[2] = {branch->ux, branch->uy}, apex[2] = {fit->x_px, fit->y_px}, turned[2] = {1.0f, -1.0f};
+    walk->own_major = u[axis];
+    walk->own_minor = u[axis ^ 1u];
+    walk->per_major = 1.0f / walk->own_major;
+    walk->to_d = turned[axis] * walk->own_major;
+    walk->a_major = apex[axis];
+    walk->a_minor = apex[axis ^ 1u];
+    walk->step_major = step[axis];
+    walk->step_minor = step[axis ^ 1u];
+    walk->n_minor = size[axis ^ 1u];
+    int32_t bits;
+    memcpy(&bits, &walk->own_major, sizeof bits);
+    walk->sign = bits >> 31 | 1;
+
+    /* Seen along the branch coordinates rise. */
+    const float along = (float)walk->sign, size_major = along * walk->own_major, from = along * walk->a_major;
+    const int32_t first = ceiling(from + span->inner_px * size_major);
+    const int32_t last = -ceiling(-(from + span->longest_px * size_major));
+    const int32_t backwards = walk->sign >> 31, span_inside = (1 - size[axis]) & backwards;
+    const int32_t first_inside = 1 + span_inside, last_inside = size[axis] - 2 + span_inside;
+    const int32_t n = least(least(last, last_inside) - first + 1, (int32_t)OC_FIT_SAMPLES);
+    walk->first = first * walk->sign;
+    walk->n = (n > 0) & (first >= first_inside) ? (uint32_t)n : 0;
+}
+
+static oc_fit_walk_t walk_make(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit,
+                               uint32_t self, const oc_fit_branch_t *branch, const oc_fit_span_t *span)
+{
+    const float turn = branch->side * (float)(1 << 14);
+    const uint32_t axis = fabsf(branch->ux) < fabsf(branch->uy);
     oc_fit_walk_t walk = {
         .dxdy = gradient->dxdy,
-        .is_flat = flat,
-        .step_major = flat ? 1 : width,
-        .step_minor = flat ? width : 1,
-        .n_minor = flat ? height : width,
-        .a_major = flat ? fit->x_px : fit->y_px,
-        .a_minor = flat ? fit->y_px : fit->x_px,
-        .slope = flat ? uy / ux : ux / uy,
-        .sign = major > 0.0f ? 1 : -1,
-        .nx = -uy * branch->side,
-        .ny = ux * branch->side,
-        .own_major = major,
-        .own_minor = flat ? uy : ux,
+        .nx = nearest(-branch->uy * turn),
+        .ny = nearest(branch->ux * turn),
         .floor = LEAST_DERIVATIVE * rules->t_b * (float)OC_GRADIENT_ONE,
+        .crowded_px = span->crowded_px,
+        .shortest_px = span->shortest_px,
+        .far_px = FAR_PX,
         .has_model = span->has_model,
+        .self = self,
+        .axis = axis,
         .reach = span->across_px,
     };
-    const float from = walk.a_major + span->inner_px * major, to = walk.a_major + span->longest_px * major;
-    const int32_t last_inside = (flat ? width : height) - 2;
-    int32_t first = (int32_t)(walk.sign > 0 ? ceilf(from) : floorf(from));
-    int32_t last = (int32_t)(walk.sign > 0 ? floorf(to) : ceilf(to));
-    if (walk.sign > 0 && last > last_inside) last = last_inside;
-    if (walk.sign < 0 && last < 1) last = 1;
-    const int32_t n = (last - first) * walk.sign + 1;
-    const bool starts_inside = first >= 1 && first <= last_inside;
-    walk.first = first;
-    walk.n = n > 0 && starts_inside ? (uint32_t)n : 0;
-    if (walk.n > OC_FIT_SAMPLES) walk.n = OC_FIT_SAMPLES;
+    walk_place(gradient, fit, branch, span, axis, &walk);
     return walk;
 }
 
-/* What the other branches add to this one's derivative. */
-static uint32_t rivals_make(const oc_fit_t *fit, uint32_t self, float blur_px,
-                            oc_fit_rival_t rivals[OC_FIT_MAX_BRANCHES])
+/* The branch's own line through the positions summed; false when they do not make one. */
+static bool branch_solve(oc_fit_branch_t *branch)
 {
-    const oc_fit_branch_t *own = &fit->branch[self];
-    uint32_t n = 0;
-    for (uint32_t j = 0; j < fit->n; j++) {
-        const oc_fit_branch_t *other = &fit->branch[j];
-        const float agree = own->side * other->side * (own->ux * other->ux + own->uy * other->uy);
-        if (j == self || fabsf(agree) < 0.02f) continue;
-        const float cosine = own->ux * other->ux + own->uy * other->uy;
-        const float sine = fabsf(own->ux * other->uy - own->uy * other->ux);
-        const float apart = cosine > 0.0f ? (sine > 0.1f ? sine : 0.1f) : 1.0f;
-        rivals[n++] = (oc_fit_rival_t){other->ux, other->uy, agree * other->amplitude, RIVAL_WIDTHS * blur_px / apart};
-    }
-    return n;
-}
-
-/* The positions that count, outwards, and how many samples were edges of those looked at so far. */
-typedef struct fit_picks {
-    uint32_t n;
-    uint8_t at[OC_FIT_SAMPLES], n_edges[OC_FIT_SAMPLES], n_tried[OC_FIT_SAMPLES];
-} fit_picks_t;
-
-/* All positions up to the shortest length, then as far as no two in a row are missing. */
-static void picks_collect(const oc_fit_profile_t *profile, uint32_t n_samples, const oc_fit_span_t *span,
-                          fit_picks_t *picks)
-{
-    uint32_t missing = 0, n_edges = 0, n_tried = 0;
-    picks->n = 0;
-    for (uint32_t m = 0; m < n_samples; m++) {
-        const int32_t found = profile->found[m];
-        const bool is_free = profile->t[m] >= span->crowded_px;
-        n_tried += found == 2 || is_free;
-        if (found == 0 || (found == 1 && !is_free)) {
-            if (++missing >= 2 && profile->t[m] > span->shortest_px) return;
-            continue;
-        }
-        n_edges++;
-        missing = 0;
-        if (found != 2) continue;
-        picks->at[picks->n] = (uint8_t)m;
-        picks->n_edges[picks->n] = (uint8_t)n_edges;
-        picks->n_tried[picks->n++] = (uint8_t)n_tried;
-    }
-}
-
-/* The branch's own line through its first n positions; false when they do not make one. */
-static bool branch_solve(const oc_kernels_t *kernels, oc_fit_branch_t *branch, const oc_fit_profile_t *profile,
-                         const fit_picks_t *picks, uint32_t n)
-{
-    kernels->sums(profile, picks->at[n - 1] + 1u, FAR_PX, &branch->sums);
     const oc_fit_sums_t *s = &branch->sums;
-    const float det = s->w * s->wtt - s->wt * s->wt;
-    if (!(det > 1e-3f * s->w * s->w)) return false;
-
-    branch->offset_px = (s->wtt * s->wd - s->wt * s->wtd) / det;
-    branch->turn_rad = (s->w * s->wtd - s->wt * s->wd) / det;
+    const float det = s->w * s->wtt - s->wt * s->wt, inv = 1.0f / det;
+    branch->offset_px = (s->wtt * s->wd - s->wt * s->wtd) * inv;
+    branch->turn_rad = (s->w * s->wtd - s->wt * s->wd) * inv;
     const float sse = s->wdd - branch->offset_px * s->wd - branch->turn_rad * s->wtd;
-    const float spare = n > 2 ? (float)(n - 2u) : 1.0f;
-    branch->rms_px = sse > 0.0f ? sqrtf(sse / s->w * (float)n / spare) : 0.0f;
+    const float n = (float)s->n, spare = n > 2.0f ? n - 2.0f : 1.0f;
+    branch->rms_px = sqrtf((sse > 0.0f ? sse : 0.0f) * n / (s->w * spare));
     branch->amplitude = s->value / s->w;
-    branch->share = (float)picks->n_edges[n - 1] / (float)picks->n_tried[n - 1];
-    branch->length_px = profile->t[picks->at[n - 1]];
-    branch->n = (float)n;
-    return true;
+    branch->share = s->share;
+    branch->length_px = s->last_px;
+    branch->n = n;
+    return det > 1e-3f * s->w * s->w;
+}
+
+static bool branch_holds(const oc_fit_branch_t *branch, const oc_fit_rules_t *rules, uint32_t n_short)
+{
+    const float limit = branch->sums.n > n_short ? GROW_RMS_PX : rules->max_rms_px;
+    return (branch->rms_px <= limit) & (branch->share >= rules->s_j);
+}
+
+static bool branch_shows(const oc_fit_branch_t *branch, const oc_fit_rules_t *rules)
+{
+    return branch->amplitude >= LEAST_CONTRAST * rules->t_b * (float)OC_GRADIENT_ONE;
+}
+
+static uint32_t without_last(uint32_t places)
+{
+    return places & ~(UINT32_C(1) << (31u - (uint32_t)__builtin_clz(places)));
+}
+
+/* The positions do not make a line: fewer of them may. */
+static bool branch_shorten(const oc_kernels_t *kernels, const oc_fit_rules_t *rules, const oc_fit_profile_t *profile,
+                           uint32_t n_short, float least_px, oc_fit_branch_t *branch)
+{
+    uint32_t places = profile->place;
+    for (uint32_t left = branch->sums.n, n = left; n > n_short;) {
+        n = n > n_short + 2 ? (n + n_short) / 2 : n - 1;
+        for (; left > n; left--) places = without_last(places);
+        kernels->sums(profile, places, FAR_PX, &branch->sums);
+        if (branch->sums.last_px < least_px || !branch_solve(branch)) return false;
+        if (branch_holds(branch, rules, n_short)) return branch_shows(branch, rules);
+    }
+    return false;
 }
 
 bool oc_judoca_branch_follow(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit,
-                             uint32_t i, const oc_fit_span_t *span, oc_fit_branch_t *branch)
+                             const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur, uint32_t i,
+                             const oc_fit_span_t *span, oc_fit_branch_t *branch)
 {
-    const oc_fit_walk_t walk = walk_make(gradient, rules, fit, branch, span);
+    const oc_fit_walk_t walk = walk_make(gradient, rules, fit, i, branch, span);
     if (walk.n < MIN_SAMPLES) return false;
 
-    const float blur_px = sqrtf(fit->blur_px2);
-    const float inv_s = 1.0f / blur_px, inv_st = 1.0f / sqrtf(fit->blur_px2 - OC_FIT_DIFFERENCE_PX2);
-    oc_fit_rival_t rivals[OC_FIT_MAX_BRANCHES];
     oc_fit_profile_t profile;
-    gradient->kernels->profile(&walk, rivals, span->has_model ? rivals_make(fit, i, blur_px, rivals) : 0,
-                               fit->blur_px2 / (walk.own_major * walk.own_major), inv_s, inv_st, &profile);
+    gradient->kernels->follow(&walk, crowd, blur, &profile, &branch->sums);
 
-    fit_picks_t picks;
-    picks_collect(&profile, walk.n, span, &picks);
-    uint32_t n_short = 0;
-    while (n_short < picks.n && profile.t[picks.at[n_short]] <= span->shortest_px + 0.5f) n_short++;
-    if (n_short < MIN_SAMPLES) n_short = MIN_SAMPLES;
-
+    const uint32_t n_short = profile.n_short < MIN_SAMPLES ? MIN_SAMPLES : profile.n_short;
     const float tolerant_px = LEAST_LENGTH * span->asked_px, strict_px = span->asked_px - 1.5f;
-    for (uint32_t n = picks.n; n >= n_short; n = n > n_short + 2 ? (n + n_short) / 2 : n - 1) {
-        const float last_px = profile.t[picks.at[n - 1]];
-        if (last_px < strict_px && last_px < tolerant_px) return false;
-        if (!branch_solve(gradient->kernels, branch, &profile, &picks, n)) return false;
-        const float limit = n > n_short ? GROW_RMS_PX : rules->max_rms_px;
-        if (branch->rms_px <= limit && branch->share >= rules->s_j) {
-            return branch->amplitude >= LEAST_CONTRAST * rules->t_b * (float)OC_GRADIENT_ONE;
-        }
-    }
-    return false;
+    const float least_px = tolerant_px < strict_px ? tolerant_px : strict_px;
+    const bool is_line = branch_solve(branch);
+    if (!((branch->sums.n >= n_short) & (branch->sums.last_px >= least_px) & is_line)) return false;
+    if (branch_holds(branch, rules, n_short)) return branch_shows(branch, rules);
+    return branch_shorten(gradient->kernels, rules, &profile, n_short, least_px, branch);
 }

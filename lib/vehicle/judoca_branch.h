@@ -12,9 +12,6 @@
 extern "C" {
 #endif
 
-/* Branches followed while fitting; the strongest OC_MAX_BRANCHES leave. */
-#define OC_FIT_MAX_BRANCHES 8u
-
 /* Where to look for one branch. */
 typedef struct oc_fit_seed {
     float ux, uy; /* unit vector along the branch, away from the apex */
@@ -55,6 +52,7 @@ typedef struct oc_fit {
     float from_x_px, from_y_px; /* pixel where the junction was seen */
     uint32_t n;
     oc_fit_branch_t branch[OC_FIT_MAX_BRANCHES];
+    oc_fit_crowd_t crowd; /* the same side by side, as of the last pass */
 } oc_fit_t;
 
 /* A ridge's variance across the edge is larger than along it by what the central difference adds. */
@@ -75,7 +73,8 @@ typedef struct oc_fit_span {
  * apex; the longest piece that stays straight wins. branch: in, direction and
  * side; out, the rest. False, and branch of no use, when it does not hold. */
 bool oc_judoca_branch_follow(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit,
-                             uint32_t i, const oc_fit_span_t *span, oc_fit_branch_t *branch);
+                             const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur, uint32_t i,
+                             const oc_fit_span_t *span, oc_fit_branch_t *branch);
 
 #ifdef __cplusplus
 }

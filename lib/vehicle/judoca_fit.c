@@ -205,29 +205,38 @@ static void fit_measure_blur(oc_fit_t *fit, float sigma_px)
     fit->blur_px2 = smaller(larger(sum / n, base + MIN_BLUR_PX2), base + MAX_BLUR_PX2);
 }
 
-static float fit_acute_cot(const oc_fit_t *fit, uint32_t self)
+static void fit_list(const oc_fit_t *fit, oc_fit_crowd_t *crowd)
 {
-    float cot = 0.0f;
+    crowd->n = fit->n;
     for (uint32_t i = 0; i < fit->n; i++) {
-        if (i == self) continue;
-        const float c = fit_cos_between(&fit->branch[i], &fit->branch[self]);
-        cot = larger(cot, c / larger(fit_sin_between(&fit->branch[i], &fit->branch[self]), 0.1f));
+        const oc_fit_branch_t *b = &fit->branch[i];
+        crowd->ux[i] = b->ux;
+        crowd->uy[i] = b->uy;
+        crowd->side[i] = b->side;
+        crowd->amplitude[i] = b->amplitude;
     }
-    return cot;
+}
+
+static float fit_largest_cot(const oc_kernels_t *kernels, oc_fit_t *fit)
+{
+    float cot[OC_FIT_MAX_BRANCHES], largest = 0.0f;
+    fit_list(fit, &fit->crowd);
+    kernels->acute(&fit->crowd, cot);
+    for (uint32_t i = 0; i < fit->n; i++) largest = larger(largest, cot[i]);
+    return largest;
 }
 
 /* Is the apex where a corner seen at the pixel may have it? Blur moves the
  * seen tip of an acute corner inwards. */
-static bool fit_is_near(const oc_fit_t *fit)
+static bool fit_is_near(const oc_kernels_t *kernels, oc_fit_t *fit)
 {
-    float limit_px = 0.0f;
-    for (uint32_t i = 0; i < fit->n; i++) {
-        limit_px = larger(limit_px, INNER_PX + 2.0f * ACUTE_PX * fit_acute_cot(fit, i));
-    }
-    limit_px = smaller(limit_px, 6.0f) + 2.0f + BLUNT_PX;
     const float dx = fit->x_px - fit->from_x_px;
     const float dy = fit->y_px - fit->from_y_px;
-    return dx * dx + dy * dy <= limit_px * limit_px;
+    const float away2 = dx * dx + dy * dy, always_px = INNER_PX + 2.0f + BLUNT_PX;
+    if (away2 <= always_px * always_px) return true;
+
+    const float limit_px = smaller(INNER_PX + 2.0f * ACUTE_PX * fit_largest_cot(kernels, fit), 6.0f) + 2.0f + BLUNT_PX;
+    return away2 <= limit_px * limit_px;
 }
 
 /* Two branches that are neither one nor a line. */
@@ -244,11 +253,18 @@ static bool fit_bends(const oc_fit_t *fit, float cos_min_angle, float cos_min_be
 
 /* What an acute pair loses at the tip it may take further out. */
 static bool branch_follow_from(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit,
-                               uint32_t i, const fit_reach_t *reach, oc_fit_span_t *span, oc_fit_branch_t *branch)
+                               const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur, uint32_t i,
+                               const fit_reach_t *reach, oc_fit_span_t *span, oc_fit_branch_t *branch)
 {
     span->shortest_px = larger(reach->shortest_px, span->inner_px + SPAN_PX);
     span->longest_px = larger(reach->longest_px + span->inner_px - reach->inner_px, span->shortest_px);
-    return oc_judoca_branch_follow(gradient, rules, fit, i, span, branch);
+    return oc_judoca_branch_follow(gradient, rules, fit, crowd, blur, i, span, branch);
+}
+
+static oc_fit_blur_t blur_of(float s2)
+{
+    const float s = sqrtf(s2), st = sqrtf(s2 - OC_FIT_DIFFERENCE_PX2), inv_s = 1.0f / s;
+    return (oc_fit_blur_t){s, st, inv_s, 1.0f / st, inv_s * inv_s};
 }
 
 /* Once round: follow all branches from the apex, then move the apex. */
@@ -257,20 +273,24 @@ static bool fit_pass(const oc_gradient_t *gradient, const oc_fit_rules_t *rules,
 {
     oc_fit_branch_t held[OC_FIT_MAX_BRANCHES];
     uint32_t n_held = 0;
+    float cot[OC_FIT_MAX_BRANCHES];
+    fit_list(fit, &fit->crowd);
+    gradient->kernels->acute(&fit->crowd, cot);
+    const oc_fit_blur_t blur = blur_of(fit->blur_px2);
+    const float searched = reach->across_px > 0 ? 1.0f : 0.0f;
     for (uint32_t i = 0; i < fit->n; i++) {
-        const float acute_px = smaller(ACUTE_PX * fit_acute_cot(fit, i), ACUTE_MAX_PX);
-        oc_fit_span_t span = {.inner_px = reach->inner_px,
+        const float acute_px = smaller(ACUTE_PX * cot[i], ACUTE_MAX_PX);
+        oc_fit_span_t span = {.inner_px = reach->inner_px + acute_px * searched,
                               .crowded_px = reach->inner_px + acute_px,
                               .asked_px = reach->shortest_px,
                               .across_px = reach->across_px,
                               .has_model = reach->has_model};
-        if (reach->across_px > 0) span.inner_px = span.crowded_px;
         oc_fit_branch_t branch = fit->branch[i];
-        bool holds = branch_follow_from(gradient, rules, fit, i, reach, &span, &branch);
+        bool holds = branch_follow_from(gradient, rules, fit, &fit->crowd, &blur, i, reach, &span, &branch);
         if (!holds && span.inner_px > reach->inner_px + 0.5f && fit->branch[i].n > 0.0f) {
             span.inner_px = reach->inner_px;
             branch = fit->branch[i];
-            holds = branch_follow_from(gradient, rules, fit, i, reach, &span, &branch);
+            holds = branch_follow_from(gradient, rules, fit, &fit->crowd, &blur, i, reach, &span, &branch);
         }
         if (holds) held[n_held++] = branch;
     }
@@ -285,11 +305,11 @@ static bool fit_pass(const oc_gradient_t *gradient, const oc_fit_rules_t *rules,
     fit_apply(fit, move);
     *moved_px = sqrtf(move[0] * move[0] + move[1] * move[1]);
     fit_measure_blur(fit, rules->sigma_px);
-    return fit_is_near(fit) &&
+    return fit_is_near(gradient->kernels, fit) &&
            fit_bends(fit, rules->cos_min_angle, reach->has_model ? rules->cos_min_bend : rules->cos_first_bend);
 }
 
-void oc_judoca_ring_build(oc_ring_table_t *table, int32_t first_px)
+void oc_judoca_ring_build(oc_ring_table_t *table, int32_t first_px, uint32_t width_px)
 {
     OC_ASSERT(table && first_px + (int32_t)OC_RING_SAMPLES <= RING_REACH);
 
@@ -297,11 +317,24 @@ void oc_judoca_ring_build(oc_ring_table_t *table, int32_t first_px)
         const double angle = d * 6.283185307179586 / OC_RAYS;
         table->ux[d] = (float)cos(angle);
         table->uy[d] = (float)sin(angle);
+        table->across[d][0] = (int16_t)lrint(-(1 << 14) * sin(angle));
+        table->across[d][1] = (int16_t)lrint((1 << 14) * cos(angle));
         for (uint32_t s = 0; s < OC_RING_SAMPLES; s++) {
-            table->dx[s][d] = (int8_t)lrint((first_px + (int32_t)s) * cos(angle));
-            table->dy[s][d] = (int8_t)lrint((first_px + (int32_t)s) * sin(angle));
+            const double radius = first_px + (int32_t)s;
+            table->at[s][d] =
+                (int32_t)lrint(radius * sin(angle)) * (int32_t)width_px + (int32_t)lrint(radius * cos(angle));
         }
     }
+}
+
+/* A branch that has not been followed yet. */
+static void branch_begin(oc_fit_branch_t *branch, float ux, float uy, float side, float amplitude)
+{
+    branch->ux = ux;
+    branch->uy = uy;
+    branch->side = side;
+    branch->amplitude = amplitude;
+    branch->n = 0.0f;
 }
 
 bool oc_judoca_fit_begin(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, float x_px, float y_px,
@@ -313,12 +346,8 @@ bool oc_judoca_fit_begin(const oc_gradient_t *gradient, const oc_fit_rules_t *ru
     fit->y_px = fit->from_y_px = y_px;
     fit->blur_px2 = rules->sigma_px * rules->sigma_px + 0.9f;
     fit->n = n_seeds < OC_FIT_MAX_BRANCHES ? n_seeds : OC_FIT_MAX_BRANCHES;
-    for (uint32_t i = 0; i < fit->n; i++) {
-        memset(&fit->branch[i], 0, sizeof fit->branch[i]);
-        fit->branch[i].ux = seed[i].ux;
-        fit->branch[i].uy = seed[i].uy;
-        fit->branch[i].side = seed[i].side;
-    }
+    for (uint32_t i = 0; i < fit->n; i++) branch_begin(&fit->branch[i], seed[i].ux, seed[i].uy, seed[i].side, 0.0f);
+    memset(&fit->crowd, 0, sizeof fit->crowd);
     const float shortest_px = smaller(rules->lambda_min_px, FIRST_LOOK_PX);
     const fit_reach_t reach = {2, INNER_PX, shortest_px, shortest_px + 1.0f, false};
     return fit_pass(gradient, rules, &reach, fit, &fit->moved_px);
@@ -326,15 +355,16 @@ bool oc_judoca_fit_begin(const oc_gradient_t *gradient, const oc_fit_rules_t *ru
 
 /* ---- branches the place did not show ---- */
 
-/* Derivatives across all directions near the apex, or a little further out; false near the border. */
-static bool ring_measure(const oc_gradient_t *gradient, const oc_fit_t *fit, float floor, const oc_ring_table_t *table,
-                         float ring[OC_RAYS])
+/* Derivatives across all directions near the apex, or a little further out, and in which of them (bit d) an edge
+ * runs; none near the border. */
+static uint32_t ring_measure(const oc_gradient_t *gradient, const oc_fit_t *fit, float t_b,
+                             const oc_ring_table_t *table, float ring[OC_RAYS])
 {
     const int32_t x = (int32_t)floorf(fit->x_px + 0.5f), y = (int32_t)floorf(fit->y_px + 0.5f);
     const int32_t width = (int32_t)gradient->width_px, height = (int32_t)gradient->height_px;
-    if (x < RING_REACH || y < RING_REACH || x + RING_REACH >= width || y + RING_REACH >= height) return false;
-    gradient->kernels->ring(table, gradient->dxdy + 2 * ((ptrdiff_t)y * width + x), width, floor, ring);
-    return true;
+    if (x < RING_REACH || y < RING_REACH || x + RING_REACH >= width || y + RING_REACH >= height) return 0;
+    return gradient->kernels->ring(table, gradient->dxdy + 2 * ((ptrdiff_t)y * width + x), 0.4f * t_b,
+                                   RING_CONTRAST * t_b, ring);
 }
 
 /* Is a direction new? One further out is only when it is near to a branch's, whose ridge hid it near the apex. */
@@ -355,18 +385,12 @@ static void fit_look_round(const oc_gradient_t *gradient, const oc_fit_rules_t *
 {
     float ring[OC_RAYS];
     const float t_b = rules->t_b * (float)OC_GRADIENT_ONE;
-    if (!ring_measure(gradient, fit, 0.4f * t_b, &rules->ring[is_far], ring)) return;
-    for (uint32_t d = 0; d < OC_RAYS && fit->n < OC_FIT_MAX_BRANCHES; d++) {
-        const float side = ring[d] > 0.0f ? 1.0f : -1.0f, here = side * ring[d];
-        const float before = side * ring[(d + OC_RAYS - 1u) % OC_RAYS], after = side * ring[(d + 1u) % OC_RAYS];
-        if (!(here >= RING_CONTRAST * t_b && here > before && here >= after)) continue;
-        oc_fit_branch_t made;
-        memset(&made, 0, sizeof made);
-        made.ux = rules->ring[0].ux[d];
-        made.uy = rules->ring[0].uy[d];
-        made.side = side;
-        made.amplitude = here;
-        if (fit_lacks(fit, &made, is_far)) fit->branch[fit->n++] = made;
+    uint32_t rest = ring_measure(gradient, fit, t_b, &rules->ring[is_far], ring);
+    for (; rest && fit->n < OC_FIT_MAX_BRANCHES; rest &= rest - 1u) {
+        const uint32_t d = (uint32_t)__builtin_ctz(rest);
+        oc_fit_branch_t *made = &fit->branch[fit->n];
+        branch_begin(made, rules->ring[0].ux[d], rules->ring[0].uy[d], ring[d] > 0.0f ? 1.0f : -1.0f, fabsf(ring[d]));
+        if (fit_lacks(fit, made, is_far)) fit->n++;
     }
 }
 

@@ -14,8 +14,8 @@
 extern "C" {
 #endif
 
-/* Table of a look round the apex, from first_px outwards. */
-void oc_judoca_ring_build(oc_ring_table_t *table, int32_t first_px);
+/* Table of a look round the apex, from first_px outwards, in images of one width. */
+void oc_judoca_ring_build(oc_ring_table_t *table, int32_t first_px, uint32_t width_px);
 
 /* First look at a junction that was seen near pixel (x_px, y_px): lines over
  * the shortest length, intersected. False when fewer than two branches hold

@@ -2,10 +2,14 @@
  * Which of the junctions found the detector reports. */
 #include "vehicle/judoca_select.h"
 
+#include <math.h>
 #include <string.h>
 
 /* The k-th junction of a cell competes with score / (1 + k * CROWDING). */
-#define CROWDING 0.15f
+#define CROWDING 0.3f
+
+/* Junctions that a cell gets when all are alike. */
+#define CELL_SHARE 2.0f
 
 /* Side of an owner square. */
 #define SQUARE_PX 8u
@@ -97,9 +101,12 @@ static uint32_t select_dedupe(oc_judoca_ws_t *ws, uint32_t n)
 }
 
 /* Lower the key of the later junctions of a crowded cell and sort again. */
-static void select_spread(oc_judoca_ws_t *ws, uint32_t n)
+static void select_spread(oc_judoca_ws_t *ws, uint32_t n, uint32_t limit)
 {
-    const uint32_t side = ws->params.spread_cell_px;
+    /* Cells of which each may have some: two, were they all alike. */
+    const float area = (float)ws->gradient.width_px * (float)ws->gradient.height_px;
+    const uint32_t fair = (uint32_t)sqrtf(CELL_SHARE * area / (float)(limit > 0 ? limit : 1u));
+    const uint32_t side = fair > ws->params.spread_cell_px ? fair : ws->params.spread_cell_px;
     const uint32_t cols = (ws->gradient.width_px - 1u) / side + 1u;
     const uint32_t rows = (ws->gradient.height_px - 1u) / side + 1u;
     memset(ws->cell, 0, (size_t)cols * rows * sizeof ws->cell[0]);
@@ -124,7 +131,7 @@ uint32_t oc_judoca_select(oc_judoca_ws_t *ws, oc_junction_t out[], uint32_t cap)
     ws->stats.n_found = n;
     const uint32_t limit = cap < ws->params.max_junctions ? cap : ws->params.max_junctions;
     if (n > limit) {
-        select_spread(ws, n);
+        select_spread(ws, n, limit);
         n = limit;
         for (uint32_t i = 0; i < n; i++) ws->rank[i].key = ws->found[ws->rank[i].index].score;
         rank_sort(ws->rank, n);

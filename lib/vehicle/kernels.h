@@ -48,30 +48,45 @@ typedef struct oc_ray_block {
 #define OC_FIT_SAMPLES 32u
 #define OC_FIT_MAX_REACH 2
 
+/* Widths of a ridge's Gaussian, px: s across the edge, st along it, where the central difference adds less. */
+typedef struct oc_fit_blur {
+    float s, st, inv_s, inv_st, inv_s2; /* inv_s2 = 1 / s^2 */
+} oc_fit_blur_t;
+
 /* One branch seen along its major axis, so that x and y share the code. */
 typedef struct oc_fit_walk {
     const int16_t *dxdy;
-    bool is_flat;                   /* the major axis is x */
     int32_t step_major, step_minor; /* pixels, into the planes */
     int32_t n_minor;                /* image size across */
     int32_t first, sign;            /* first major coordinate and its step */
     uint32_t n;                     /* samples to take, all inside the image along the major axis */
     float a_major, a_minor;         /* apex */
-    float slope;                    /* minor per major */
-    float nx, ny;                   /* unit normal on the side of the gradient */
+    int32_t nx, ny;                 /* normal on the side of the gradient, 1/2^14 */
     float own_major, own_minor;     /* unit vector along the branch */
-    bool has_model;                 /* branches end at the apex: level the ridge */
+    float per_major;                /* 1 / own_major */
+    float to_d;                     /* the minor axis on the normal (-uy, ux) */
     float floor;                    /* least derivative of an edge point */
+    float crowded_px;               /* nearer than this another ridge may hide a sample */
+    float shortest_px;              /* up to here missing samples end nothing */
+    float far_px;                   /* samples from here on tell the blur */
+    uint32_t self;                  /* lane of the crowd */
+    uint32_t axis;                  /* the major one: 0 x, 1 y */
     int32_t reach;                  /* half width of the search across, 0..OC_FIT_MAX_REACH */
+    bool has_model;                 /* branches end at the apex and add to each other; without, the reach is the largest */
 } oc_fit_walk_t;
 
-/* What another branch adds to this one's derivative near the apex: the
- * Gaussian ridge of a half line from the apex. */
-typedef struct oc_fit_rival {
-    float ux, uy;    /* along the rival */
-    float amplitude; /* of its ridge in this branch's derivative, signed */
-    float reach_px;  /* further out on this branch it adds nothing */
-} oc_fit_rival_t;
+/* All branches of a fit, one per lane; lanes from n on hold any numbers. Of those at the end the strongest OC_MAX_BRANCHES
+ * leave. */
+#define OC_FIT_MAX_BRANCHES 8u
+typedef struct oc_fit_crowd {
+    uint32_t n;
+    float ux[OC_FIT_MAX_BRANCHES], uy[OC_FIT_MAX_BRANCHES]; /* along the branch */
+    float side[OC_FIT_MAX_BRANCHES];                        /* of the gradient */
+    float amplitude[OC_FIT_MAX_BRANCHES];                   /* of the ridge */
+} oc_fit_crowd_t;
+
+/* A ridge further off than this many of its widths adds nothing. */
+#define OC_FIT_RIVAL_WIDTHS 3.0f
 
 /* Samples of a branch, outwards; t along it from the apex, d across it on the normal (-uy, ux), px. */
 typedef struct oc_fit_profile {
@@ -79,7 +94,11 @@ typedef struct oc_fit_profile {
     float gain[OC_FIT_SAMPLES];    /* share of the full ridge this near to the apex */
     float value[OC_FIT_SAMPLES];   /* derivative at the ridge */
     float bend[OC_FIT_SAMPLES];    /* 2 value - before - after */
-    int32_t found[OC_FIT_SAMPLES]; /* 0 no edge, 1 an edge that does not say where, 2 a position */
+    /* Bit m = sample m. */
+    uint32_t place;      /* positions: edges that say where, before two missing in a row end the branch */
+    uint32_t edge;       /* all edges, those that do not say where only where no ridge hides them */
+    uint32_t tried;      /* positions and samples that no ridge hides */
+    uint32_t n_short;    /* positions up to half a pixel beyond the shortest length */
 } oc_fit_profile_t;
 
 /* Weighted sums over the ridge positions of one branch, in its own frame at
@@ -88,13 +107,17 @@ typedef struct oc_fit_sums {
     float w, wt, wtt, wd, wtd, wdd;
     float value;       /* of derivative times gain; w = gain^2 */
     float bend, level; /* of far samples: sum of 2 v - before - after, and of v */
+    uint32_t n;        /* positions */
+    float share;       /* edges of the samples that count, up to the last position */
+    float last_px;     /* t of the last position */
 } oc_fit_sums_t;
 
 /* Round the apex: derivatives across OC_RAYS directions. */
 #define OC_RING_SAMPLES 5u
 typedef struct oc_ring_table {
     float ux[OC_RAYS], uy[OC_RAYS];
-    int8_t dx[OC_RING_SAMPLES][OC_RAYS], dy[OC_RING_SAMPLES][OC_RAYS]; /* pixels from the apex */
+    int16_t across[OC_RAYS][2];           /* the normal (-uy, ux), 1/2^14 */
+    int32_t at[OC_RING_SAMPLES][OC_RAYS]; /* pixels from the apex' into the planes */
 } oc_ring_table_t;
 
 typedef struct oc_kernels {
@@ -125,17 +148,21 @@ typedef struct oc_kernels {
                  const uint64_t *const right[OC_RAYS], uint32_t live, const uint64_t wanted[4], oc_ray_block_t *block);
 
     /* Derivative across each direction, mean of the samples; 0 unless all but one of them are beyond floor with the
-     * mean's sign. apex points to the pair of the apex' pixel, width is the planes' pitch in pixels. */
-    void (*ring)(const oc_ring_table_t *table, const int16_t *apex, int32_t width, float floor, float ring[OC_RAYS]);
+     * mean's sign. apex points to the pair of the apex' pixel. Returns the directions, bit d, of at least the contrast
+     * in which it is greatest. */
+    uint32_t (*ring)(const oc_ring_table_t *table, const int16_t *apex, float floor, float contrast,
+                     float ring[OC_RAYS]);
 
-    /* Sums over the positions before sample end; those from far_px on tell the blur. */
-    void (*sums)(const oc_fit_profile_t *profile, uint32_t end, float far_px, oc_fit_sums_t *sums);
+    /* Cotangent of the angle to the nearest other branch, for each; 0 without an acute angle. */
+    void (*acute)(const oc_fit_crowd_t *crowd, float cot[OC_FIT_MAX_BRANCHES]);
 
-    /* Ridge positions along a branch, what the rivals add taken off. s2 is the
-     * square of the ridge's Gaussian width along the minor axis, px; inv_s one
-     * over its width in px across the edge, inv_st along it. */
-    void (*profile)(const oc_fit_walk_t *walk, const oc_fit_rival_t rivals[], uint32_t n_rivals, float s2, float inv_s,
-                    float inv_st, oc_fit_profile_t *out);
+    /* Ridge positions along a branch, what the others add to its derivative near the apex taken off, and the sums over
+     * them. */
+    void (*follow)(const oc_fit_walk_t *walk, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur,
+                   oc_fit_profile_t *out, oc_fit_sums_t *sums);
+
+    /* Sums over some positions, bit m = sample m, at least one. */
+    void (*sums)(const oc_fit_profile_t *profile, uint32_t places, float far_px, oc_fit_sums_t *sums);
 } oc_kernels_t;
 
 /* The kernels of a level, or of the best below it that this processor has. */
