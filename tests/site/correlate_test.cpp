@@ -100,6 +100,20 @@ TEST_F(CorrelateTest, UprightSquaresAreLessAlikeThanWarpedOnes)
     EXPECT_LT(mean_score(upright), mean_score(branches_only()) - 0.2);
 }
 
+// Its two branches have one direction in space; what they seem to bend by, 9 degrees here, is their error.
+TEST_F(CorrelateTest, ABarOfATSpansNoPlane)
+{
+    for (View *view : {&left_, &right_}) {
+        for (oc_junction_t &junction : view->junctions) {
+            const double opposite = static_cast<double>(junction.branch[0].angle_rad) + CV_PI + 0.16;
+            junction.branch[1].angle_rad = static_cast<float>(std::fmod(opposite, 2 * CV_PI));
+        }
+    }
+    CorrelateOptions options = branches_only();
+    options.min_bend_sine = 0.01; // which alone would let them pass
+    for (int i = 0; i < static_cast<int>(corners_.size()); i++) EXPECT_EQ(score(i, i, options), 0);
+}
+
 TEST_F(CorrelateTest, AnchoringMattersWhenPosesAreWrong)
 {
     const double error[6] = {0.01, -0.01, 0.01, 0.014, -0.014, 0.014};

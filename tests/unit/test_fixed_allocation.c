@@ -57,6 +57,36 @@ static size_t c64(size_t bytes)
     return (bytes + 63u) / 64u * 64u;
 }
 
+static size_t ceil_of(size_t a, size_t b)
+{
+    return (a + b - 1u) / b;
+}
+
+/* docs/design.md (2), term by term. */
+static size_t detector_formula_bytes(size_t w, size_t h, const oc_judoca_params_t *params)
+{
+    const size_t columns = ceil_of(w, 64), rows = 4u * ceil_of(h, 4) + 32u, map = 8u * (columns + 2u) * rows;
+    const size_t cell = params->spread_cell_px;
+    const size_t gradient = c64(4u * w * h) + 2u * c64(map) + c64(26u * (64u * columns + 32u)) + c64(16u * columns);
+    const size_t search = 2u * c64(768u * rows) + c64(2u * (ceil_of(h, 8) + 2u) * (8u * columns + 16u)) +
+                          c64(16u * sizeof(oc_ray_block_t)) + c64((w * h / 16u + 64u) * sizeof(oc_place_t));
+    const size_t choice = c64(map) + c64(8192u * sizeof(oc_junction_t)) + c64(8192u * sizeof(oc_judoca_rank_t)) +
+                          c64(2u * 8192u) + c64(2u * ceil_of(w, 8) * ceil_of(h, 8)) +
+                          c64(2u * ceil_of(w, cell) * ceil_of(h, cell));
+    return 64u + gradient + search + choice;
+}
+
+static void the_detector_is_as_large_as_the_formula_says(void)
+{
+    const size_t sizes[][2] = {{32, 32}, {33, 65}, {64, 64}, {127, 130}, {640, 480}, {1920, 1080}, {4096, 4096}};
+    for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
+        oc_judoca_params_t params = oc_judoca_defaults();
+        params.spread_cell_px += (uint32_t)i;
+        TEST_ASSERT_EQUAL_size_t(detector_formula_bytes(sizes[i][0], sizes[i][1], &params),
+                                 oc_judoca_size_bytes((uint32_t)sizes[i][0], (uint32_t)sizes[i][1], &params));
+    }
+}
+
 /* docs/design.md (1), term by term. */
 static size_t formula_bytes(const oc_vehicle_config_t *c, bool is_printed)
 {
@@ -269,6 +299,7 @@ int main(void)
 {
     guard_install();
     UNITY_BEGIN();
+    RUN_TEST(the_detector_is_as_large_as_the_formula_says);
     RUN_TEST(the_block_is_as_large_as_the_formula_says);
     RUN_TEST(sixteen_grey_views_at_640x480_fit_in_16_mb);
     RUN_TEST(the_guard_sees_every_use_of_the_heap);
