@@ -210,7 +210,7 @@ typedef struct places_choice {
 static uint32_t candidates_limit(const oc_judoca_ws_t *ws)
 {
     const uint32_t n_px = ws->gradient.width_px * ws->gradient.height_px;
-    const uint32_t own = n_px / OC_JUDOCA_PX_PER_CANDIDATE + 64u;
+    const uint32_t own = n_px / OC_JUDOCA_PX_PER_CANDIDATE + OC_JUDOCA_LEAST_CANDIDATES;
     const uint32_t limit = ws->params.max_candidates > 0 ? ws->params.max_candidates : own;
     return limit < OC_JUDOCA_MAX_FOUND ? limit : OC_JUDOCA_MAX_FOUND;
 }

@@ -23,7 +23,8 @@ extern "C" {
 
 /* Places fitted per image at most. */
 #define OC_JUDOCA_MAX_CANDIDATES 262144u
-#define OC_JUDOCA_PX_PER_CANDIDATE 64u
+#define OC_JUDOCA_PX_PER_CANDIDATE 144u
+#define OC_JUDOCA_LEAST_CANDIDATES 512u
 
 /* Fits kept per image before the nearest duplicates are dropped; 96 bytes each. */
 #define OC_JUDOCA_MAX_FOUND 8192u
@@ -51,7 +52,7 @@ typedef struct oc_judoca_params {
     float min_distance_px;   /* of two apices nearer than this the better stays, 1..20; 3 */
     uint32_t max_junctions;  /* kept per image, 1..OC_MAX_JUNCTIONS; 600 */
     uint32_t max_candidates; /* places fitted per image, those of best pre-score, shared over the image,
-                              * 16..OC_JUDOCA_MAX_CANDIDATES; 0 = one per OC_JUDOCA_PX_PER_CANDIDATE
+                              * 16..OC_JUDOCA_MAX_CANDIDATES; 0 = OC_JUDOCA_LEAST_CANDIDATES and one per
                               * pixels. Bounds the time; 0 */
     uint32_t spread_cell_px; /* side of the cells that share max_junctions when it
                               * binds, 8..4096; 40 */

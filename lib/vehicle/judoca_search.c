@@ -110,6 +110,10 @@ oc_status_t oc_search_init(oc_search_t *search, oc_arena_t *arena, uint32_t widt
     search->block = piece[3];
     search->place = piece[4];
     search->max_places = search_max_places(width_px, height_px);
+    for (uint32_t d = 0; d < OC_RAYS; d++) {
+        search->ux[d] = (float)cos(d * 6.283185307179586 / OC_RAYS);
+        search->uy[d] = (float)sin(d * 6.283185307179586 / OC_RAYS);
+    }
     table_build(&search->table, radius_px, s_j);
     return OC_OK;
 }
@@ -280,22 +284,40 @@ static uint32_t look_rays(const oc_search_t *search, uint32_t row, uint32_t bit,
     return set;
 }
 
+/* Mean derivative across the edges that run from a pixel, FIRST_SAMPLE_PX + 2 out along each ray that holds. At the
+ * pixel itself an X has none, and more a little aside, where no junction is. */
+static float look_contrast(const oc_search_t *search, const oc_gradient_t *gradient, const oc_place_t *place)
+{
+    const uint32_t sample = search->table.n_samples - 3u;
+    float sum = 0.0f, n = 0.0f;
+    for (uint32_t side = 0; side < 2; side++) {
+        for (uint32_t rest = side == 0 ? place->left : place->right; rest; rest &= rest - 1u) {
+            const uint32_t d = (uint32_t)__builtin_ctz(rest);
+            const size_t x = (size_t)(place->x + search->table.dx[d][sample]);
+            const size_t y = (size_t)(place->y + search->table.dy[d][sample]);
+            const int16_t *g = gradient->dxdy + 2u * (y * gradient->width_px + x);
+            const float across = search->ux[d] * (float)g[1] - search->uy[d] * (float)g[0];
+            sum += side == 0 ? across : -across;
+            n += 1.0f;
+        }
+    }
+    return sum > 0.0f ? sum / (n * (float)OC_GRADIENT_ONE) : 0.0f;
+}
+
 static void look_emit(oc_search_t *search, const look_t *look, uint32_t row, uint32_t bit, bool is_strong)
 {
     if (search->n_places++ >= search->max_places) return;
 
-    const uint32_t x = 64u * look->column + bit, y = look->first_y + row;
-    const int16_t *g = look->gradient->dxdy + 2u * ((size_t)y * look->gradient->width_px + x);
-    const float gx = g[0], gy = g[1];
-    const float contrast = sqrtf(gx * gx + gy * gy) / (float)OC_GRADIENT_ONE;
-    const float score = contrast / (contrast + HALF_CONTRAST) * (is_strong ? 1.0f : WEAK_SHARE);
-    search->place[search->n_places - 1u] = (oc_place_t){
-        .x = (uint16_t)x,
-        .y = (uint16_t)y,
-        .prescore = (uint16_t)(score * 65535.0f),
+    oc_place_t *place = &search->place[search->n_places - 1u];
+    *place = (oc_place_t){
+        .x = (uint16_t)(64u * look->column + bit),
+        .y = (uint16_t)(look->first_y + row),
         .left = look_rays(search, row, bit, 0),
         .right = look_rays(search, row, bit, OC_RAYS),
     };
+    const float contrast = look_contrast(search, look->gradient, place);
+    const float score = contrast / (contrast + HALF_CONTRAST) * (is_strong ? 1.0f : WEAK_SHARE);
+    place->prescore = (uint16_t)(score * 65535.0f);
 }
 
 /* Columns of a word within the cluster's reach of a bit. */

@@ -28,6 +28,7 @@ typedef struct oc_place {
 /* Scratch of the search for one image size. */
 typedef struct oc_search {
     oc_ray_table_t table;
+    float ux[OC_RAYS], uy[OC_RAYS];
     uint32_t pitch, n_columns, n_tile_rows;
     uint64_t *edge;        /* [3 columns][OC_RAYS][pitch] B+ by direction of its gradient, grown by a pixel across */
     uint64_t *near;        /* [3 columns][OC_RAYS][pitch] the same with the two directions to each side */

@@ -179,6 +179,23 @@ static void twin_look_at(int x, int y)
     strong[y][x] = kernel_has_pair(is_whole);
 }
 
+/* Mean derivative across the rays that hold, four pixels out. */
+static float twin_contrast(int x, int y, uint32_t at_left, uint32_t at_right)
+{
+    float sum = 0, n = 0;
+    for (int side = 0; side < 2; side++) {
+        for (uint32_t d = 0; d < OC_RAYS; d++) {
+            if (!((side == 0 ? at_left : at_right) >> d & 1u)) continue;
+            const double angle = d * 6.283185307179586 / OC_RAYS;
+            const int16_t *g = pair_at(x + (int)lrint(4 * cos(angle)), y + (int)lrint(4 * sin(angle)));
+            const float across = (float)cos(angle) * (float)g[1] - (float)sin(angle) * (float)g[0];
+            sum += side == 0 ? across : -across;
+            n += 1;
+        }
+    }
+    return sum > 0 ? sum / (n * (float)OC_GRADIENT_ONE) : 0.0f;
+}
+
 /* The middle of the cluster that begins at a pixel, in its 64 x 64 pixels; clears the cluster. */
 static void twin_emit(int x, int y)
 {
@@ -211,8 +228,7 @@ static void twin_emit(int x, int y)
             best_y = v;
         }
     }
-    const int16_t *g = pair_at(best_x, best_y);
-    const float contrast = sqrtf((float)g[0] * (float)g[0] + (float)g[1] * (float)g[1]) / (float)OC_GRADIENT_ONE;
+    const float contrast = twin_contrast(best_x, best_y, left[best_y][best_x], right[best_y][best_x]);
     const float score = contrast / (contrast + 10.0f) * (is_strong ? 1.0f : 0.7f);
     TEST_ASSERT_TRUE(n_places < MAX_PLACES);
     place[n_places++] = (oc_place_t){(uint16_t)best_x, (uint16_t)best_y, (uint16_t)(score * 65535.0f),
