@@ -250,6 +250,7 @@ static bool done_test_and_set(const oc_judoca_ws_t *ws, float x, float y)
     return is_done;
 }
 
+/* Has an apex in this pixel been fitted before, or is a junction within two pixels? */
 static bool done_test(const oc_judoca_ws_t *ws, uint32_t x, uint32_t y)
 {
     return ws->done[oc_bitmap_at(ws->gradient.pitch, x / 64u, y)] >> x % 64u & 1u;

@@ -69,7 +69,7 @@ static void walk_place(const oc_gradient_t *gradient, const oc_fit_t *fit, const
     const int32_t first_inside = 1 + span_inside, last_inside = size[axis] - 2 + span_inside;
     const int32_t n = least(least(last, last_inside) - first + 1, (int32_t)OC_FIT_SAMPLES);
     walk->first = first * walk->sign;
-    walk->n = (n > 0) & (first >= first_inside) ? (uint32_t)n : 0;
+    walk->n = ((n > 0) & (first >= first_inside)) ? (uint32_t)n : 0;
 }
 
 /* Written field by field where it stays: what is copied as soon as it is written waits for the write. */

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause
  * The kernels of the fit: samples of one branch and their sums. Part of kernels_body.h.
  *
- * A branch has some eight samples, one vector. It stays in registers from the pixels to the answer, and what follows
- * from a sample is a bit in a mask: branches of code that depend on the picture cost more than the sums do. */
+ * A branch has some eight samples, one vector. What follows from a sample is a bit in a mask: branches of code that
+ * depend on the picture cost more than the sums do. */
 #ifndef OUTCROP_VEHICLE_KERNELS_BRANCH_BODY_H
 #define OUTCROP_VEHICLE_KERNELS_BRANCH_BODY_H
 
