@@ -72,7 +72,7 @@ typedef struct oc_fit_walk {
     uint32_t self;                  /* lane of the crowd */
     uint32_t axis;                  /* the major one: 0 x, 1 y */
     int32_t reach;                  /* half width of the search across, 0..OC_FIT_MAX_REACH */
-    bool has_model; /* branches end at the apex and add to each other; without, the reach is the largest */
+    bool has_model;                 /* branches end at the apex and add to each other; without, the reach is the largest */
 } oc_fit_walk_t;
 
 /* All branches of a fit, one per lane; lanes from n on hold any numbers. Of those at the end the strongest OC_MAX_BRANCHES
@@ -91,14 +91,14 @@ typedef struct oc_fit_crowd {
 /* Samples of a branch, outwards; t along it from the apex, d across it on the normal (-uy, ux), px. */
 typedef struct oc_fit_profile {
     float t[OC_FIT_SAMPLES], d[OC_FIT_SAMPLES];
-    float gain[OC_FIT_SAMPLES];  /* share of the full ridge this near to the apex */
-    float value[OC_FIT_SAMPLES]; /* derivative at the ridge */
-    float bend[OC_FIT_SAMPLES];  /* 2 value - before - after */
+    float gain[OC_FIT_SAMPLES];    /* share of the full ridge this near to the apex */
+    float value[OC_FIT_SAMPLES];   /* derivative at the ridge */
+    float bend[OC_FIT_SAMPLES];    /* 2 value - before - after */
     /* Bit m = sample m. */
-    uint32_t place;   /* positions: edges that say where, before two missing in a row end the branch */
-    uint32_t edge;    /* all edges, those that do not say where only where no ridge hides them */
-    uint32_t tried;   /* positions and samples that no ridge hides */
-    uint32_t n_short; /* positions up to half a pixel beyond the shortest length */
+    uint32_t place;      /* positions: edges that say where, before two missing in a row end the branch */
+    uint32_t edge;       /* all edges, those that do not say where only where no ridge hides them */
+    uint32_t tried;      /* positions and samples that no ridge hides */
+    uint32_t n_short;    /* positions up to half a pixel beyond the shortest length */
 } oc_fit_profile_t;
 
 /* Weighted sums over the ridge positions of one branch, in its own frame at

@@ -142,7 +142,7 @@ KERNEL_INLINE void ridge_take(const oc_fit_walk_t *walk, int32_t m, kernel_ridge
     /* Away from the image by less than the shift, so the cut is a floor. */
     const oc_ints_t nearest = __builtin_convertvector(expected + 64.5f, oc_ints_t) - 64;
     const int32_t highest = walk->n_minor - 1 - half;
-    const oc_ints_t is_low = nearest<half, is_high = nearest> highest;
+    const oc_ints_t is_low = nearest < half, is_high = nearest > highest;
     const oc_ints_t centre = (is_low & half) | (is_high & highest) | (~(is_low | is_high) & nearest);
     const oc_lanes_t centre_px = __builtin_convertvector(centre, oc_lanes_t);
     ridge->major = from_apex;
@@ -160,11 +160,11 @@ KERNEL_INLINE void ridge_take(const oc_fit_walk_t *walk, int32_t m, kernel_ridge
 
 /* What another branch adds to this one's derivative near the apex: the Gaussian ridge of a half line from there. */
 typedef struct kernel_rivals {
-    uint32_t which;                             /* bit per lane of the crowd */
-    float t_major[OC_LANES], t_minor[OC_LANES]; /* along the rival, st */
-    float d_major[OC_LANES], d_minor[OC_LANES]; /* along the rival, s */
-    float amplitude[OC_LANES];                  /* in this branch's derivative, signed */
-    float reach[OC_LANES];                      /* further out on this branch it adds nothing */
+    uint32_t which;                                                       /* bit per lane of the crowd */
+    float t_major[OC_LANES], t_minor[OC_LANES];                           /* along the rival, st */
+    float d_major[OC_LANES], d_minor[OC_LANES];                           /* along the rival, s */
+    float amplitude[OC_LANES];                                            /* in this branch's derivative, signed */
+    float reach[OC_LANES];                                                /* further out on this branch it adds nothing */
 } kernel_rivals_t;
 
 KERNEL_INLINE void rivals_find(const oc_fit_walk_t *walk, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur,
@@ -320,7 +320,8 @@ static void kernel_sums(const oc_fit_profile_t *profile, uint32_t places, float 
 /* ---- a branch ---- */
 
 KERNEL_INLINE void follow_reach(const oc_fit_walk_t *walk, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur,
-                                oc_fit_profile_t *out, oc_fit_sums_t *sums, const int32_t reach, const bool has_model)
+                                oc_fit_profile_t *out, oc_fit_sums_t *sums, const int32_t reach,
+                                const bool has_model)
 {
     kernel_marks_t marks = {0};
     kernel_rivals_t rivals;
@@ -381,16 +382,14 @@ KERNEL_INLINE oc_lanes_t ring_take(const oc_ring_table_t *table, const int16_t *
     }
     const oc_ints_t is_front = sum > 0;
     const oc_ints_t n_steady = (is_front & n_front) | (~is_front & n_back);
-    return lanes_where(n_steady >= (int32_t)OC_RING_SAMPLES - 1,
-                       __builtin_convertvector(sum, oc_lanes_t) * (1.0f / OC_RING_SAMPLES));
+    return lanes_where(n_steady >= (int32_t)OC_RING_SAMPLES - 1, __builtin_convertvector(sum, oc_lanes_t) * (1.0f / OC_RING_SAMPLES));
 }
 
 static uint32_t kernel_ring(const oc_ring_table_t *table, const int16_t *apex, float floor, float contrast,
                             float ring[OC_RAYS])
 {
     float closed[OC_RAYS + 2u]; /* one direction more at either end */
-    for (uint32_t d = 0; d < OC_RAYS; d += OC_LANES)
-        lanes_store(closed + 1 + d, ring_take(table, apex, (int32_t)floor, d));
+    for (uint32_t d = 0; d < OC_RAYS; d += OC_LANES) lanes_store(closed + 1 + d, ring_take(table, apex, (int32_t)floor, d));
     closed[0] = closed[OC_RAYS];
     closed[OC_RAYS + 1u] = closed[1];
     memcpy(ring, closed + 1, OC_RAYS * sizeof ring[0]);
