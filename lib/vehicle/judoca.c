@@ -199,17 +199,20 @@ static bool seeds_bend(const oc_fit_seed_t seed[], uint32_t n)
 #define PRESCORE_BINS 1024u
 
 /* Which places are fitted when there are more than max_candidates: all above
- * a bin of the prescore, and of that bin an even share in their order. */
+ * a bin of the prescore, and of that bin an even share. */
 typedef struct places_choice {
     uint32_t bin;      /* the one that is shared */
     uint32_t n, quota; /* places in it, and how many of them are taken */
     uint32_t met;
 } places_choice_t;
 
+/* No more than there is room for, were all of them junctions: what came last in the image would go without. */
 static uint32_t candidates_limit(const oc_judoca_ws_t *ws)
 {
-    if (ws->params.max_candidates > 0) return ws->params.max_candidates;
-    return ws->gradient.width_px * ws->gradient.height_px / OC_JUDOCA_PX_PER_CANDIDATE + 64u;
+    const uint32_t n_px = ws->gradient.width_px * ws->gradient.height_px;
+    const uint32_t own = n_px / OC_JUDOCA_PX_PER_CANDIDATE + 64u;
+    const uint32_t limit = ws->params.max_candidates > 0 ? ws->params.max_candidates : own;
+    return limit < OC_JUDOCA_MAX_FOUND ? limit : OC_JUDOCA_MAX_FOUND;
 }
 
 static places_choice_t places_choose(const oc_judoca_ws_t *ws, uint32_t n)
@@ -227,8 +230,9 @@ static bool places_take(places_choice_t *choice, const oc_place_t *place)
 {
     const uint32_t bin = place->prescore / (65536u / PRESCORE_BINS);
     if (bin != choice->bin) return bin > choice->bin;
-    const uint64_t i = choice->met++;
-    return i * choice->quota / choice->n != (i + 1u) * choice->quota / choice->n;
+    /* Multiples of the golden ratio are even on every part of the image, and in step with no pattern in it. */
+    const uint32_t part = choice->met++ * 2654435769u;
+    return (uint64_t)part * choice->n < (uint64_t)choice->quota << 32;
 }
 
 static bool is_in_image(const oc_gradient_t *gradient, float x, float y)
@@ -246,6 +250,11 @@ static bool done_test_and_set(const oc_judoca_ws_t *ws, float x, float y)
     return is_done;
 }
 
+static bool done_test(const oc_judoca_ws_t *ws, uint32_t x, uint32_t y)
+{
+    return ws->done[oc_bitmap_at(ws->gradient.pitch, x / 64u, y)] >> x % 64u & 1u;
+}
+
 /* What leads to within two pixels of a junction would find it again. */
 static void done_surround(const oc_judoca_ws_t *ws, float x_px, float y_px)
 {
@@ -261,6 +270,7 @@ static void done_surround(const oc_judoca_ws_t *ws, float x_px, float y_px)
  * fitted once. */
 static bool fit_place(oc_judoca_ws_t *ws, const oc_fit_rules_t *rules, const oc_place_t *place)
 {
+    if (done_test(ws, place->x, place->y)) return false;
     oc_fit_seed_t seed[OC_FIT_MAX_BRANCHES];
     uint32_t n = seeds_of_side(place->left, 1.0f, seed, 0);
     n = seeds_of_side(place->right, -1.0f, seed, n);
@@ -295,7 +305,8 @@ static void fit_places(oc_judoca_ws_t *ws)
     memset(ws->done, 0, oc_bitmap_words(g->width_px, g->height_px) * sizeof ws->done[0]);
     const uint32_t n = ws->search.n_places < ws->search.max_places ? ws->search.n_places : ws->search.max_places;
     places_choice_t choice = places_choose(ws, n);
-    for (uint32_t i = 0; i < n && ws->stats.n_found < OC_JUDOCA_MAX_FOUND; i++) {
+    const uint32_t limit = candidates_limit(ws);
+    for (uint32_t i = 0; i < n && ws->stats.n_fitted < limit; i++) {
         if (!places_take(&choice, &ws->search.place[i])) continue;
         ws->stats.n_fitted++;
         if (fit_place(ws, &rules, &ws->search.place[i])) ws->stats.n_found++;

@@ -42,8 +42,9 @@ static inline int32_t least(int32_t a, int32_t b)
 /* Where the samples of a branch are, cut to the image. Which axis is major and which way it goes is as good as
  * random: values are picked from tables and signs multiplied, so that no branch of code depends on it. */
 static void walk_place(const oc_gradient_t *gradient, const oc_fit_t *fit, const oc_fit_branch_t *branch,
-                       const oc_fit_span_t *span, uint32_t axis, oc_fit_walk_t *walk)
+                       const oc_fit_span_t *span, oc_fit_walk_t *walk)
 {
+    const uint32_t axis = walk->axis;
     const int32_t size[2] = {(int32_t)gradient->width_px, (int32_t)gradient->height_px};
     const int32_t step[2] = {1, (int32_t)gradient->width_px};
     const float u[2] = {branch->ux, branch->uy}, apex[2] = {fit->x_px, fit->y_px}, turned[2] = {1.0f, -1.0f};
@@ -71,26 +72,24 @@ static void walk_place(const oc_gradient_t *gradient, const oc_fit_t *fit, const
     walk->n = (n > 0) & (first >= first_inside) ? (uint32_t)n : 0;
 }
 
-static oc_fit_walk_t walk_make(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit,
-                               uint32_t self, const oc_fit_branch_t *branch, const oc_fit_span_t *span)
+/* Written field by field where it stays: what is copied as soon as it is written waits for the write. */
+static void walk_make(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit, uint32_t self,
+                      const oc_fit_span_t *span, oc_fit_walk_t *walk)
 {
+    const oc_fit_branch_t *branch = &fit->branch[self];
     const float turn = branch->side * (float)(1 << 14);
-    const uint32_t axis = fabsf(branch->ux) < fabsf(branch->uy);
-    oc_fit_walk_t walk = {
-        .dxdy = gradient->dxdy,
-        .nx = nearest(-branch->uy * turn),
-        .ny = nearest(branch->ux * turn),
-        .floor = LEAST_DERIVATIVE * rules->t_b * (float)OC_GRADIENT_ONE,
-        .crowded_px = span->crowded_px,
-        .shortest_px = span->shortest_px,
-        .far_px = FAR_PX,
-        .has_model = span->has_model,
-        .self = self,
-        .axis = axis,
-        .reach = span->across_px,
-    };
-    walk_place(gradient, fit, branch, span, axis, &walk);
-    return walk;
+    walk->dxdy = gradient->dxdy;
+    walk->nx = nearest(-branch->uy * turn);
+    walk->ny = nearest(branch->ux * turn);
+    walk->floor = LEAST_DERIVATIVE * rules->t_b * (float)OC_GRADIENT_ONE;
+    walk->crowded_px = span->crowded_px;
+    walk->shortest_px = span->shortest_px;
+    walk->far_px = FAR_PX;
+    walk->has_model = span->has_model;
+    walk->self = self;
+    walk->axis = fabsf(branch->ux) < fabsf(branch->uy);
+    walk->reach = span->across_px;
+    walk_place(gradient, fit, branch, span, walk);
 }
 
 /* The branch's own line through the positions summed; false when they do not make one. */
@@ -141,21 +140,38 @@ static bool branch_shorten(const oc_kernels_t *kernels, const oc_fit_rules_t *ru
     return false;
 }
 
-bool oc_judoca_branch_follow(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit,
-                             const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur, uint32_t i,
-                             const oc_fit_span_t *span, oc_fit_branch_t *branch)
+/* Does a branch hold as it was followed? */
+static bool branch_judge(const oc_kernels_t *kernels, const oc_fit_rules_t *rules, const oc_fit_profile_t *profile,
+                         float asked_px, oc_fit_branch_t *branch)
 {
-    const oc_fit_walk_t walk = walk_make(gradient, rules, fit, i, branch, span);
-    if (walk.n < MIN_SAMPLES) return false;
-
-    oc_fit_profile_t profile;
-    gradient->kernels->follow(&walk, crowd, blur, &profile, &branch->sums);
-
-    const uint32_t n_short = profile.n_short < MIN_SAMPLES ? MIN_SAMPLES : profile.n_short;
-    const float tolerant_px = LEAST_LENGTH * span->asked_px, strict_px = span->asked_px - 1.5f;
+    const uint32_t n_short = profile->n_short < MIN_SAMPLES ? MIN_SAMPLES : profile->n_short;
+    const float tolerant_px = LEAST_LENGTH * asked_px, strict_px = asked_px - 1.5f;
     const float least_px = tolerant_px < strict_px ? tolerant_px : strict_px;
     const bool is_line = branch_solve(branch);
     if (!((branch->sums.n >= n_short) & (branch->sums.last_px >= least_px) & is_line)) return false;
     if (branch_holds(branch, rules, n_short)) return branch_shows(branch, rules);
-    return branch_shorten(gradient->kernels, rules, &profile, n_short, least_px, branch);
+    return branch_shorten(kernels, rules, profile, n_short, least_px, branch);
+}
+
+uint32_t oc_judoca_branches_follow(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, oc_fit_t *fit,
+                                   const oc_fit_blur_t *blur, uint32_t which, const oc_fit_span_t span[])
+{
+    oc_fit_track_t track[OC_FIT_MAX_BRANCHES];
+    uint32_t n = 0, branch[OC_FIT_MAX_BRANCHES], holds = 0;
+    for (uint32_t rest = which; rest; rest &= rest - 1u) {
+        const uint32_t i = (uint32_t)__builtin_ctz(rest);
+        walk_make(gradient, rules, fit, i, &span[i], &track[n].walk);
+        track[n].sums = &fit->branch[i].sums;
+        branch[n] = i;
+        n += track[n].walk.n >= MIN_SAMPLES;
+    }
+    if (n == 0) return 0;
+    gradient->kernels->follow(track, n, &fit->crowd, blur);
+    for (uint32_t k = 0; k < n; k++) {
+        const uint32_t i = branch[k];
+        const bool is_held =
+            branch_judge(gradient->kernels, rules, &track[k].profile, span[i].asked_px, &fit->branch[i]);
+        holds |= (uint32_t)is_held << i;
+    }
+    return holds;
 }

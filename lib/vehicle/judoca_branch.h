@@ -69,12 +69,11 @@ typedef struct oc_fit_span {
     bool has_model;    /* take off what the other branches add */
 } oc_fit_span_t;
 
-/* Follow branch i of a fit and fit its own line, in the frame of the fit's
- * apex; the longest piece that stays straight wins. branch: in, direction and
- * side; out, the rest. False, and branch of no use, when it does not hold. */
-bool oc_judoca_branch_follow(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit,
-                             const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur, uint32_t i,
-                             const oc_fit_span_t *span, oc_fit_branch_t *branch);
+/* Follow the branches of a fit whose bit is set and fit each one's own line, in the frame of the fit's apex; the
+ * longest piece that stays straight wins. Of the branches direction and side are read, the rest is written; the others
+ * are read as the crowd shows them. Returns those that hold; of the others the rest is of no use. */
+uint32_t oc_judoca_branches_follow(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, oc_fit_t *fit,
+                                   const oc_fit_blur_t *blur, uint32_t which, const oc_fit_span_t span[]);
 
 #ifdef __cplusplus
 }

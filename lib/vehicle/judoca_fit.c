@@ -252,13 +252,11 @@ static bool fit_bends(const oc_fit_t *fit, float cos_min_angle, float cos_min_be
 }
 
 /* What an acute pair loses at the tip it may take further out. */
-static bool branch_follow_from(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const oc_fit_t *fit,
-                               const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur, uint32_t i,
-                               const fit_reach_t *reach, oc_fit_span_t *span, oc_fit_branch_t *branch)
+static void span_from(const fit_reach_t *reach, float inner_px, oc_fit_span_t *span)
 {
-    span->shortest_px = larger(reach->shortest_px, span->inner_px + SPAN_PX);
-    span->longest_px = larger(reach->longest_px + span->inner_px - reach->inner_px, span->shortest_px);
-    return oc_judoca_branch_follow(gradient, rules, fit, crowd, blur, i, span, branch);
+    span->inner_px = inner_px;
+    span->shortest_px = larger(reach->shortest_px, inner_px + SPAN_PX);
+    span->longest_px = larger(reach->longest_px + inner_px - reach->inner_px, span->shortest_px);
 }
 
 static oc_fit_blur_t blur_of(float s2)
@@ -267,35 +265,53 @@ static oc_fit_blur_t blur_of(float s2)
     return (oc_fit_blur_t){s, st, inv_s, 1.0f / st, inv_s * inv_s};
 }
 
-/* Once round: follow all branches from the apex, then move the apex. */
-static bool fit_pass(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const fit_reach_t *reach,
-                     oc_fit_t *fit, float *moved_px)
+/* Follow all branches where their neighbours allow; those that do not hold there, from as near to the apex as the
+ * others. Returns those that hold. */
+static uint32_t fit_follow(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const fit_reach_t *reach,
+                           oc_fit_t *fit)
 {
-    oc_fit_branch_t held[OC_FIT_MAX_BRANCHES];
-    uint32_t n_held = 0;
     float cot[OC_FIT_MAX_BRANCHES];
     fit_list(fit, &fit->crowd);
     gradient->kernels->acute(&fit->crowd, cot);
     const oc_fit_blur_t blur = blur_of(fit->blur_px2);
     const float searched = reach->across_px > 0 ? 1.0f : 0.0f;
+    const uint32_t all = (1u << fit->n) - 1u;
+    oc_fit_span_t span[OC_FIT_MAX_BRANCHES];
+    uint32_t again = 0;
     for (uint32_t i = 0; i < fit->n; i++) {
-        const float acute_px = smaller(ACUTE_PX * cot[i], ACUTE_MAX_PX);
-        oc_fit_span_t span = {.inner_px = reach->inner_px + acute_px * searched,
-                              .crowded_px = reach->inner_px + acute_px,
-                              .asked_px = reach->shortest_px,
-                              .across_px = reach->across_px,
-                              .has_model = reach->has_model};
-        oc_fit_branch_t branch = fit->branch[i];
-        bool holds = branch_follow_from(gradient, rules, fit, &fit->crowd, &blur, i, reach, &span, &branch);
-        if (!holds && span.inner_px > reach->inner_px + 0.5f && fit->branch[i].n > 0.0f) {
-            span.inner_px = reach->inner_px;
-            branch = fit->branch[i];
-            holds = branch_follow_from(gradient, rules, fit, &fit->crowd, &blur, i, reach, &span, &branch);
-        }
-        if (holds) held[n_held++] = branch;
+        const float acute_px = smaller(ACUTE_PX * cot[i], ACUTE_MAX_PX), further_px = searched * acute_px;
+        span[i].crowded_px = reach->inner_px + acute_px;
+        span[i].asked_px = reach->shortest_px;
+        span[i].across_px = reach->across_px;
+        span[i].has_model = reach->has_model;
+        span_from(reach, reach->inner_px + further_px, &span[i]);
+        again |= (uint32_t)((further_px > 0.5f) & (fit->branch[i].n > 0.0f)) << i;
     }
-    memcpy(fit->branch, held, n_held * sizeof held[0]);
-    fit->n = n_held;
+    const uint32_t holds = oc_judoca_branches_follow(gradient, rules, fit, &blur, all, span);
+    again &= ~holds;
+    if (again == 0) return holds;
+    for (uint32_t i = 0; i < fit->n; i++) span_from(reach, reach->inner_px, &span[i]);
+    return holds | oc_judoca_branches_follow(gradient, rules, fit, &blur, again, span);
+}
+
+/* Keep the branches whose bit is set. */
+static void fit_keep(oc_fit_t *fit, uint32_t holds)
+{
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < fit->n; i++) {
+        if (!(holds >> i & 1u)) continue;
+        if (n != i) fit->branch[n] = fit->branch[i];
+        n++;
+    }
+    fit->n = n;
+}
+
+/* Once round: follow all branches from the apex, then move the apex. */
+static bool fit_pass(const oc_gradient_t *gradient, const oc_fit_rules_t *rules, const fit_reach_t *reach,
+                     oc_fit_t *fit, float *moved_px)
+{
+    const uint32_t holds = fit_follow(gradient, rules, reach, fit);
+    if (holds != (1u << fit->n) - 1u) fit_keep(fit, holds);
     fit_merge(fit, rules->cos_min_angle);
     if (fit->n < 2) return false;
 

@@ -122,15 +122,22 @@ static uint32_t direction_in_octant(int32_t high, int32_t low)
            (uint32_t)(scaled >= 840 * high);
 }
 
+/* Signs and octants of an image are as good as random, so nothing here branches. */
+static inline uint32_t direction_of(int32_t dx, int32_t dy)
+{
+    const uint32_t left = dx < 0, up = dy < 0;
+    const int32_t ax = dx < 0 ? -dx : dx, ay = dy < 0 ? -dy : dy;
+    const uint32_t steep = ax < ay;
+    const uint32_t k = direction_in_octant(ax < ay ? ay : ax, ax < ay ? ax : ay);
+    uint32_t s = OC_RAYS / 4u * steep + (1u - 2u * steep) * k;
+    s = OC_RAYS / 2u * left + (1u - 2u * left) * s;
+    s = (1u - 2u * up) * s;
+    return (dx | dy) == 0 ? 0 : s % OC_RAYS;
+}
+
 uint32_t oc_search_direction(int32_t dx, int32_t dy)
 {
-    if (dx == 0 && dy == 0) return 0;
-
-    const int32_t ax = dx < 0 ? -dx : dx, ay = dy < 0 ? -dy : dy;
-    uint32_t s = ax >= ay ? direction_in_octant(ax, ay) : OC_RAYS / 4u - direction_in_octant(ay, ax);
-    if (dx < 0) s = OC_RAYS / 2u - s;
-    if (dy < 0) s = OC_RAYS - s;
-    return s % OC_RAYS;
+    return direction_of(dx, dy);
 }
 
 /* ---- insert ---- */
@@ -157,47 +164,53 @@ static void ring_clear(const oc_search_t *search, uint64_t *ring, uint32_t used[
     used[slot] = 0;
 }
 
-/* One pixel of B+, and its neighbours across the edge. */
-static void insert_pixel(oc_search_t *search, int32_t column, uint32_t bit, uint32_t y, int32_t dx, int32_t dy)
-{
-    const uint32_t d = oc_search_direction(dx, dy);
-    search->edge_used[ring_slot(column)] |= 1u << d;
-    search->tile[(y / TILE_PX + 1u) * tile_pitch(search->n_columns) + 8u * ((uint32_t)column + 1u) + bit / TILE_PX] |=
-        (uint16_t)(1u << d % 16u);
-
-    uint64_t *at = ring_plane(search, search->edge, column, d) + OC_BITMAP_BORDER + y;
-    const uint64_t here = (uint64_t)1 << bit;
-    const bool upright = (dx < 0 ? -dx : dx) > (dy < 0 ? -dy : dy);
-    at[0] |= here;
-    if (!upright) {
-        at[-1] |= here;
-        at[1] |= here;
-        return;
-    }
-    at[0] |= here << 1 | here >> 1;
-    if (bit == 0) {
-        ring_plane(search, search->edge, column - 1, d)[OC_BITMAP_BORDER + y] |= (uint64_t)1 << 63;
-        search->edge_used[ring_slot(column - 1)] |= 1u << d;
-    } else if (bit == 63) {
-        ring_plane(search, search->edge, column + 1, d)[OC_BITMAP_BORDER + y] |= 1;
-        search->edge_used[ring_slot(column + 1)] |= 1u << d;
-    }
-}
-
 static void search_insert(oc_search_t *search, const oc_gradient_t *gradient, int32_t column)
 {
     ring_clear(search, search->edge, search->edge_used, column + 1);
     const uint64_t *thin = gradient->thin + oc_bitmap_at(gradient->pitch, (uint32_t)column, 0);
-    for (uint32_t y = 0; y < gradient->height_px; y++) {
+    uint64_t *left = ring_plane(search, search->edge, column - 1, 0);
+    uint64_t *mid = ring_plane(search, search->edge, column, 0);
+    uint64_t *right = ring_plane(search, search->edge, column + 1, 0);
+    uint16_t *tiles = search->tile + tile_pitch(search->n_columns) + 8u * ((uint32_t)column + 1u);
+    const uint32_t pitch = search->pitch, tiles_pitch = tile_pitch(search->n_columns), height = gradient->height_px;
+    uint32_t used = 0, left_used = 0, right_used = 0;
+    for (uint32_t y = 0; y < height; y++) {
         const int16_t *row = gradient->dxdy + 2u * ((size_t)y * gradient->width_px + 64u * (uint32_t)column);
         for (uint64_t rest = thin[y]; rest; rest &= rest - 1u) {
             const uint32_t bit = (uint32_t)__builtin_ctzll(rest);
-            insert_pixel(search, column, bit, y, row[2u * bit], row[2u * bit + 1u]);
+            const int32_t dx = row[2u * bit], dy = row[2u * bit + 1u];
+            const uint32_t d = direction_of(dx, dy);
+            /* The pixel and its neighbours across the edge. */
+            const size_t at = (size_t)d * pitch + OC_BITMAP_BORDER + y;
+            const uint64_t here = (uint64_t)1 << bit;
+            const uint64_t upright = (dx < 0 ? -dx : dx) > (dy < 0 ? -dy : dy) ? UINT64_MAX : 0;
+            mid[at - 1] |= here & ~upright;
+            mid[at] |= here | ((here << 1 | here >> 1) & upright);
+            mid[at + 1] |= here & ~upright;
+            used |= 1u << d;
+            tiles[y / TILE_PX * tiles_pitch + bit / TILE_PX] |= (uint16_t)(1u << d % 16u);
+            if (bit == 0 && upright) {
+                left[at] |= (uint64_t)1 << 63;
+                left_used |= 1u << d;
+            } else if (bit == 63 && upright) {
+                right[at] |= 1;
+                right_used |= 1u << d;
+            }
         }
     }
+    search->edge_used[ring_slot(column - 1)] |= left_used;
+    search->edge_used[ring_slot(column)] |= used;
+    search->edge_used[ring_slot(column + 1)] |= right_used;
 }
 
 /* ---- spread ---- */
+
+/* Directions, bit d, and the two to each side of each. */
+static uint32_t with_neighbours(uint32_t directions)
+{
+    const uint64_t twice = (uint64_t)directions << 32 | directions;
+    return (uint32_t)((twice | twice >> 1 | twice >> 2) | (twice << 1 | twice << 2) >> 32);
+}
 
 static void search_spread(oc_search_t *search, const oc_gradient_t *gradient, int32_t column)
 {
@@ -214,8 +227,7 @@ static void search_spread(oc_search_t *search, const oc_gradient_t *gradient, in
         return;
     }
     gradient->kernels->spread(from, to, search->pitch);
-    const uint64_t twice = (uint64_t)used << 32 | used;
-    *near_used = (uint32_t)((twice | twice >> 1 | twice >> 2) | (twice << 1 | twice << 2) >> 32);
+    *near_used = with_neighbours(used);
 }
 
 /* ---- look ---- */
@@ -228,8 +240,8 @@ static bool orientations_differ(uint32_t met)
     return !((met & met << 1) || met == 0x8001u);
 }
 
-/* Pixels of a word whose tile, or one beside it, has edges that differ. */
-static uint64_t tiles_active(const oc_search_t *search, uint32_t tile_row, uint32_t column)
+/* Pixels of a word whose tile, or one beside it, has edges that differ. met: out, the orientations of all these. */
+static uint64_t tiles_active(const oc_search_t *search, uint32_t tile_row, uint32_t column, uint32_t *met)
 {
     const uint32_t pitch = tile_pitch(search->n_columns);
     const uint16_t *at = search->tile + (tile_row + 1u) * pitch + 8u * (column + 1u);
@@ -239,6 +251,7 @@ static uint64_t tiles_active(const oc_search_t *search, uint32_t tile_row, uint3
         sum[i + 1] = (uint32_t)at[i - (int32_t)pitch] | at[i] | at[i + (int32_t)pitch];
         any |= sum[i + 1];
     }
+    *met = any;
     if (!orientations_differ(any)) return 0;
     uint64_t active = 0;
     for (uint32_t i = 0; i < 8; i++) {
@@ -369,7 +382,8 @@ static bool look_band(oc_search_t *search, look_t *look)
         memset(&look->strong[row], 0, 4 * sizeof look->strong[0]);
         if (y >= gradient->height_px) continue;
 
-        const uint64_t active = tiles_active(search, y / TILE_PX, look->column);
+        uint32_t met;
+        const uint64_t active = tiles_active(search, y / TILE_PX, look->column, &met);
         uint64_t wanted[4], some = 0;
         for (uint32_t i = 0; i < 4; i++) some |= wanted[i] = thin[row + i] & active;
         if (some == 0) continue;
@@ -380,7 +394,10 @@ static bool look_band(oc_search_t *search, look_t *look)
             mid[d] = look->mid[d] + y;
             right[d] = look->right[d] + y;
         }
-        gradient->kernels->rays(&search->table, left, mid, right, look->live, wanted, block);
+        /* Rays that end, with the pixel that planes are grown by, within the tiles beside see no other orientations. */
+        const bool is_within = search->table.dx[0][0] < (int32_t)TILE_PX;
+        const uint32_t live = look->live & (is_within ? with_neighbours(met << 16 | met) : UINT32_MAX);
+        gradient->kernels->rays(&search->table, left, mid, right, live, wanted, block);
         for (uint32_t i = 0; i < 4; i++) {
             look->weak[row + i] = block->weak[i];
             look->strong[row + i] = block->strong[i];

@@ -72,7 +72,7 @@ typedef struct oc_fit_walk {
     uint32_t self;                  /* lane of the crowd */
     uint32_t axis;                  /* the major one: 0 x, 1 y */
     int32_t reach;                  /* half width of the search across, 0..OC_FIT_MAX_REACH */
-    bool has_model;                 /* branches end at the apex and add to each other; without, the reach is the largest */
+    bool has_model; /* branches end at the apex and add to each other; without, the reach is the largest */
 } oc_fit_walk_t;
 
 /* All branches of a fit, one per lane; lanes from n on hold any numbers. Of those at the end the strongest OC_MAX_BRANCHES
@@ -91,14 +91,14 @@ typedef struct oc_fit_crowd {
 /* Samples of a branch, outwards; t along it from the apex, d across it on the normal (-uy, ux), px. */
 typedef struct oc_fit_profile {
     float t[OC_FIT_SAMPLES], d[OC_FIT_SAMPLES];
-    float gain[OC_FIT_SAMPLES];    /* share of the full ridge this near to the apex */
-    float value[OC_FIT_SAMPLES];   /* derivative at the ridge */
-    float bend[OC_FIT_SAMPLES];    /* 2 value - before - after */
+    float gain[OC_FIT_SAMPLES];  /* share of the full ridge this near to the apex */
+    float value[OC_FIT_SAMPLES]; /* derivative at the ridge */
+    float bend[OC_FIT_SAMPLES];  /* 2 value - before - after */
     /* Bit m = sample m. */
-    uint32_t place;      /* positions: edges that say where, before two missing in a row end the branch */
-    uint32_t edge;       /* all edges, those that do not say where only where no ridge hides them */
-    uint32_t tried;      /* positions and samples that no ridge hides */
-    uint32_t n_short;    /* positions up to half a pixel beyond the shortest length */
+    uint32_t place;   /* positions: edges that say where, before two missing in a row end the branch */
+    uint32_t edge;    /* all edges, those that do not say where only where no ridge hides them */
+    uint32_t tried;   /* positions and samples that no ridge hides */
+    uint32_t n_short; /* positions up to half a pixel beyond the shortest length */
 } oc_fit_profile_t;
 
 /* Weighted sums over the ridge positions of one branch, in its own frame at
@@ -111,6 +111,13 @@ typedef struct oc_fit_sums {
     float share;       /* edges of the samples that count, up to the last position */
     float last_px;     /* t of the last position */
 } oc_fit_sums_t;
+
+/* One branch on its way through the kernel. */
+typedef struct oc_fit_track {
+    oc_fit_walk_t walk; /* with samples */
+    oc_fit_profile_t profile;
+    oc_fit_sums_t *sums; /* out */
+} oc_fit_track_t;
 
 /* Round the apex: derivatives across OC_RAYS directions. */
 #define OC_RING_SAMPLES 5u
@@ -156,10 +163,9 @@ typedef struct oc_kernels {
     /* Cotangent of the angle to the nearest other branch, for each; 0 without an acute angle. */
     void (*acute)(const oc_fit_crowd_t *crowd, float cot[OC_FIT_MAX_BRANCHES]);
 
-    /* Ridge positions along a branch, what the others add to its derivative near the apex taken off, and the sums over
-     * them. */
-    void (*follow)(const oc_fit_walk_t *walk, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur,
-                   oc_fit_profile_t *out, oc_fit_sums_t *sums);
+    /* Ridge positions along n branches of one crowd, what the others add to its derivative near the apex taken off, and
+     * the sums over them. All have a model or none. */
+    void (*follow)(oc_fit_track_t track[], uint32_t n, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur);
 
     /* Sums over some positions, bit m = sample m, at least one. */
     void (*sums)(const oc_fit_profile_t *profile, uint32_t places, float far_px, oc_fit_sums_t *sums);

@@ -11,7 +11,7 @@
 #include <string.h>
 
 #include "vehicle/kernels.h"
-#include "vehicle/kernels_branch.h"
+#include "vehicle/kernels_branch_body.h"
 #include "vehicle/simd.h"
 
 /* tan 22.5 degrees in 1/128: which neighbours lie along a gradient. */
@@ -227,13 +227,15 @@ KERNEL_INLINE oc_words_t words_load(const uint64_t *from)
     return words;
 }
 
-KERNEL_INLINE oc_words_t ray_shifted(const uint64_t *left, const uint64_t *mid, const uint64_t *right, int32_t dx,
-                                     int32_t dy)
+/* Pixels k columns further, and where the word ends those of the one beside it. */
+KERNEL_INLINE oc_words_t ray_to_right(const uint64_t *mid, const uint64_t *right, int32_t k)
 {
-    const oc_words_t here = words_load(mid + dy);
-    if (dx > 0) return (here >> dx) | (words_load(right + dy) << (64 - dx));
-    if (dx < 0) return (here << -dx) | (words_load(left + dy) >> (64 + dx));
-    return here;
+    return (words_load(mid) >> k) | (words_load(right) << 1 << (63 - k));
+}
+
+KERNEL_INLINE oc_words_t ray_to_left(const uint64_t *mid, const uint64_t *left, int32_t k)
+{
+    return (words_load(mid) << k) | (words_load(left) >> 1 >> (63 - k));
 }
 
 /* Misses are counted in two bit planes; more than n_spare kills. */
@@ -245,20 +247,38 @@ KERNEL_INLINE oc_words_t ray_too_many(uint32_t n_spare, oc_words_t ones, oc_word
     return carry;
 }
 
-KERNEL_INLINE oc_words_t ray_follow(const oc_ray_table_t *table, uint32_t direction, const uint64_t *left,
-                                    const uint64_t *mid, const uint64_t *right, oc_words_t alive, oc_words_t *whole)
+/* Sample s of all rays of one direction. */
+KERNEL_INLINE oc_words_t ray_sample(const oc_ray_table_t *table, uint32_t direction, uint32_t s, const uint64_t *side,
+                                    const uint64_t *mid, bool is_left)
 {
-    const int8_t *dx = table->dx[direction], *dy = table->dy[direction];
+    const int32_t dx = table->dx[direction][s], dy = table->dy[direction][s];
+    return is_left ? ray_to_left(mid + dy, side + dy, -dx) : ray_to_right(mid + dy, side + dy, dx);
+}
+
+/* Most rays end at the first sample; which of the others do is not worth a branch. */
+KERNEL_INLINE oc_words_t ray_follow(const oc_ray_table_t *table, uint32_t direction, const uint64_t *side,
+                                    const uint64_t *mid, bool is_left, oc_words_t alive, oc_words_t *whole,
+                                    const uint32_t n_samples, const uint32_t n_spare)
+{
+    alive &= ray_sample(table, direction, 0, side, mid, is_left);
+    *whole = alive;
+    if (!oc_words_any(&alive)) return alive;
+    if (n_samples == 5 && n_spare == 2) { /* two of four */
+        const oc_words_t a = ray_sample(table, direction, 1, side, mid, is_left);
+        const oc_words_t b = ray_sample(table, direction, 2, side, mid, is_left);
+        const oc_words_t c = ray_sample(table, direction, 3, side, mid, is_left);
+        const oc_words_t e = ray_sample(table, direction, 4, side, mid, is_left);
+        *whole = alive & (a & b) & (c & e);
+        return alive & ((a & b) | (c & e) | ((a | b) & (c | e)));
+    }
     oc_words_t ones = {0}, twos = {0};
-    alive &= ray_shifted(left, mid, right, dx[0], dy[0]);
-    for (uint32_t s = 1; s < table->n_samples; s++) {
-        if ((s & 1u) && !oc_words_any(&alive)) break;
-        const oc_words_t miss = ~ray_shifted(left, mid, right, dx[s], dy[s]);
+    for (uint32_t s = 1; s < n_samples; s++) {
+        const oc_words_t miss = ~ray_sample(table, direction, s, side, mid, is_left);
         const oc_words_t up = ones & miss;
         ones ^= miss;
         const oc_words_t carry = twos & up;
         twos ^= up;
-        alive &= ~ray_too_many(table->n_spare, ones, twos, carry);
+        alive &= ~ray_too_many(n_spare, ones, twos, carry);
     }
     *whole = alive & ~(ones | twos);
     return alive;
@@ -277,29 +297,45 @@ KERNEL_INLINE oc_words_t rays_paired(const oc_words_t holds[OC_RAYS])
     return paired;
 }
 
+KERNEL_INLINE void rays_follow(const oc_ray_table_t *table, const uint64_t *const left[OC_RAYS],
+                               const uint64_t *const mid[OC_RAYS], const uint64_t *const right[OC_RAYS], uint32_t live,
+                               const uint64_t wanted[4], oc_ray_block_t *block, const uint32_t n_samples,
+                               const uint32_t n_spare)
+{
+    const oc_words_t start = words_load(wanted), none = {0};
+    oc_words_t holds[OC_RAYS], wholes[OC_RAYS], any = none;
+    for (uint32_t d = 0; d < OC_RAYS; d++) {
+        holds[d] = wholes[d] = none;
+        for (uint32_t r = d; r < 2u * OC_RAYS; r += OC_RAYS) {
+            const uint32_t p = ray_plane(r);
+            oc_words_t alive = none, whole = none;
+            if (live >> p & 1u) {
+                alive = table->dx[d][0] < 0
+                            ? ray_follow(table, d, left[p], mid[p], true, start, &whole, n_samples, n_spare)
+                            : ray_follow(table, d, right[p], mid[p], false, start, &whole, n_samples, n_spare);
+            }
+            memcpy(block->ray[r], &alive, sizeof alive);
+            holds[d] |= alive;
+            wholes[d] |= whole;
+        }
+        any |= holds[d];
+    }
+    const bool has_any = oc_words_any(&any);
+    const oc_words_t weak = has_any ? rays_paired(holds) : none, strong = has_any ? rays_paired(wholes) : none;
+    memcpy(block->weak, &weak, sizeof weak);
+    memcpy(block->strong, &strong, sizeof strong);
+}
+
 static void kernel_rays(const oc_ray_table_t *table, const uint64_t *const left[OC_RAYS],
                         const uint64_t *const mid[OC_RAYS], const uint64_t *const right[OC_RAYS], uint32_t live,
                         const uint64_t wanted[4], oc_ray_block_t *block)
 {
-    oc_words_t holds[OC_RAYS], wholes[OC_RAYS], any = {0};
-    for (uint32_t d = 0; d < OC_RAYS; d++) holds[d] = wholes[d] = any;
-    const oc_words_t start = words_load(wanted);
-    for (uint32_t r = 0; r < 2u * OC_RAYS; r++) {
-        const uint32_t p = ray_plane(r), direction = r % OC_RAYS;
-        if (!(live >> p & 1u)) {
-            memset(block->ray[r], 0, sizeof block->ray[r]);
-            continue;
-        }
-        oc_words_t whole;
-        const oc_words_t alive = ray_follow(table, direction, left[p], mid[p], right[p], start, &whole);
-        memcpy(block->ray[r], &alive, sizeof alive);
-        holds[direction] |= alive;
-        wholes[direction] |= whole;
-        any |= alive;
+    const uint32_t n = table->n_samples;
+    if (n == 5 && table->n_spare == 2) {
+        rays_follow(table, left, mid, right, live, wanted, block, 5, 2);
+    } else {
+        rays_follow(table, left, mid, right, live, wanted, block, n, table->n_spare);
     }
-    const oc_words_t weak = rays_paired(holds), strong = rays_paired(wholes);
-    memcpy(block->weak, &weak, sizeof weak);
-    memcpy(block->strong, &strong, sizeof strong);
 }
 
 #endif

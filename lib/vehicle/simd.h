@@ -14,6 +14,9 @@
 #include <arm_neon.h>
 #endif
 
+/* Vectors wider than the target's are passed between functions that are inlined, so no calling convention matters. */
+#pragma GCC diagnostic ignored "-Wpsabi"
+
 /* Four bitmap words: 64 pixels of four rows. GCC and clang turn the operators
  * into whatever the target has. */
 typedef uint64_t oc_words_t __attribute__((vector_size(32)));

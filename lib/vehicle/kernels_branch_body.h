@@ -3,8 +3,8 @@
  *
  * A branch has some eight samples, one vector. It stays in registers from the pixels to the answer, and what follows
  * from a sample is a bit in a mask: branches of code that depend on the picture cost more than the sums do. */
-#ifndef OUTCROP_VEHICLE_KERNELS_BRANCH_H
-#define OUTCROP_VEHICLE_KERNELS_BRANCH_H
+#ifndef OUTCROP_VEHICLE_KERNELS_BRANCH_BODY_H
+#define OUTCROP_VEHICLE_KERNELS_BRANCH_BODY_H
 
 #include <string.h>
 
@@ -142,7 +142,7 @@ KERNEL_INLINE void ridge_take(const oc_fit_walk_t *walk, int32_t m, kernel_ridge
     /* Away from the image by less than the shift, so the cut is a floor. */
     const oc_ints_t nearest = __builtin_convertvector(expected + 64.5f, oc_ints_t) - 64;
     const int32_t highest = walk->n_minor - 1 - half;
-    const oc_ints_t is_low = nearest < half, is_high = nearest > highest;
+    const oc_ints_t is_low = nearest<half, is_high = nearest> highest;
     const oc_ints_t centre = (is_low & half) | (is_high & highest) | (~(is_low | is_high) & nearest);
     const oc_lanes_t centre_px = __builtin_convertvector(centre, oc_lanes_t);
     ridge->major = from_apex;
@@ -160,11 +160,11 @@ KERNEL_INLINE void ridge_take(const oc_fit_walk_t *walk, int32_t m, kernel_ridge
 
 /* What another branch adds to this one's derivative near the apex: the Gaussian ridge of a half line from there. */
 typedef struct kernel_rivals {
-    uint32_t which;                                                       /* bit per lane of the crowd */
-    float t_major[OC_LANES], t_minor[OC_LANES];                           /* along the rival, st */
-    float d_major[OC_LANES], d_minor[OC_LANES];                           /* along the rival, s */
-    float amplitude[OC_LANES];                                            /* in this branch's derivative, signed */
-    float reach[OC_LANES];                                                /* further out on this branch it adds nothing */
+    uint32_t which;                             /* bit per lane of the crowd */
+    float t_major[OC_LANES], t_minor[OC_LANES]; /* along the rival, st */
+    float d_major[OC_LANES], d_minor[OC_LANES]; /* along the rival, s */
+    float amplitude[OC_LANES];                  /* in this branch's derivative, signed */
+    float reach[OC_LANES];                      /* further out on this branch it adds nothing */
 } kernel_rivals_t;
 
 KERNEL_INLINE void rivals_find(const oc_fit_walk_t *walk, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur,
@@ -215,8 +215,9 @@ KERNEL_INLINE void ridge_level(const oc_fit_walk_t *walk, const oc_fit_blur_t *b
 
 /* Leave of the ridge what the branch would show if it were alone and had no end. */
 KERNEL_INLINE void ridge_alone(const oc_fit_walk_t *walk, const kernel_rivals_t *rivals, const oc_fit_blur_t *blur,
-                               float from_px, kernel_ridge_t *ridge)
+                               int32_t m, kernel_ridge_t *ridge)
 {
+    const float from_px = ((float)(walk->first + walk->sign * m) - walk->a_major) * walk->per_major;
     uint32_t rest = rivals->which & oc_bits_of_lanes(lanes_load(rivals->reach) > from_px);
     for (; rest; rest &= rest - 1u) ridge_clear(rivals, (uint32_t)__builtin_ctz(rest), ridge);
     if (from_px < 3.0f * blur->st + 1.0f) ridge_level(walk, blur, ridge);
@@ -232,8 +233,10 @@ typedef struct kernel_marks {
 
 /* Vertex of the parabola through the three taps, put right for a Gaussian. */
 KERNEL_INLINE void ridge_peak(const oc_fit_walk_t *walk, const kernel_ridge_t *ridge, const oc_fit_blur_t *blur,
-                              const float most, int32_t m, oc_fit_profile_t *out, kernel_marks_t *marks)
+                              int32_t m, oc_fit_profile_t *out, kernel_marks_t *marks)
 {
+    /* Without a search the ridge may be nearer to the next pixel. */
+    const float most = walk->reach == 0 ? 1.0f : 0.51f;
     const float inv_s2 = walk->own_major * walk->own_major * blur->inv_s2; /* along the minor axis */
     const float gain = inv_s2 * (0.25f + (1.0f / 24.0f) * inv_s2);
     const oc_lanes_t middle = ridge->middle;
@@ -319,34 +322,47 @@ static void kernel_sums(const oc_fit_profile_t *profile, uint32_t places, float 
 
 /* ---- a branch ---- */
 
-KERNEL_INLINE void follow_reach(const oc_fit_walk_t *walk, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur,
-                                oc_fit_profile_t *out, oc_fit_sums_t *sums, const int32_t reach,
-                                const bool has_model)
+/* Samples m .. m + 7 of all branches that have them. */
+KERNEL_INLINE void tracks_take(const oc_fit_track_t track[], uint32_t n, int32_t m, kernel_ridge_t ridge[])
 {
-    kernel_marks_t marks = {0};
-    kernel_rivals_t rivals;
-    if (has_model) rivals_find(walk, crowd, blur, &rivals);
-    const int32_t n = (int32_t)walk->n;
-    for (int32_t m = 0; m < n; m += LANES) {
-        const float from_px = ((float)(walk->first + walk->sign * m) - walk->a_major) * walk->per_major;
-        kernel_ridge_t ridge;
-        ridge_take(walk, m, &ridge, reach);
-        if (has_model) ridge_alone(walk, &rivals, blur, from_px, &ridge);
-        /* Without a search the ridge may be nearer to the next pixel. */
-        ridge_peak(walk, &ridge, blur, reach == 0 ? 1.0f : 0.51f, m, out, &marks);
+    for (uint32_t i = 0; i < n; i++) {
+        const oc_fit_walk_t *walk = &track[i].walk;
+        if ((int32_t)walk->n <= m) continue;
+        switch (walk->reach) {
+        case 0: ridge_take(walk, m, &ridge[i], 0); break;
+        case 1: ridge_take(walk, m, &ridge[i], 1); break;
+        default: ridge_take(walk, m, &ridge[i], OC_FIT_MAX_REACH); break;
+        }
     }
-    profile_pick(walk, &marks, out);
-    sums_take(out, out->place, walk->far_px, sums);
 }
 
-static void kernel_follow(const oc_fit_walk_t *walk, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur,
-                          oc_fit_profile_t *out, oc_fit_sums_t *sums)
+/* Step by step for all branches: they do not depend on each other, so one fills the waits of another. */
+static void kernel_follow(oc_fit_track_t track[], uint32_t n, const oc_fit_crowd_t *crowd, const oc_fit_blur_t *blur)
 {
-    switch (walk->has_model ? walk->reach : -1) {
-    case -1: follow_reach(walk, crowd, blur, out, sums, OC_FIT_MAX_REACH, false); break;
-    case 0: follow_reach(walk, crowd, blur, out, sums, 0, true); break;
-    case 1: follow_reach(walk, crowd, blur, out, sums, 1, true); break;
-    default: follow_reach(walk, crowd, blur, out, sums, OC_FIT_MAX_REACH, true); break;
+    kernel_ridge_t ridge[OC_FIT_MAX_BRANCHES];
+    kernel_rivals_t rivals[OC_FIT_MAX_BRANCHES];
+    kernel_marks_t marks[OC_FIT_MAX_BRANCHES];
+    int32_t most = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        marks[i] = (kernel_marks_t){0, 0, 0, 0, 0};
+        most = most > (int32_t)track[i].walk.n ? most : (int32_t)track[i].walk.n;
+    }
+    const bool has_model = track[0].walk.has_model;
+    for (uint32_t i = 0; i < n && has_model; i++) rivals_find(&track[i].walk, crowd, blur, &rivals[i]);
+    for (int32_t m = 0; m < most; m += LANES) {
+        tracks_take(track, n, m, ridge);
+        for (uint32_t i = 0; i < n && has_model; i++) {
+            if ((int32_t)track[i].walk.n > m) ridge_alone(&track[i].walk, &rivals[i], blur, m, &ridge[i]);
+        }
+        for (uint32_t i = 0; i < n; i++) {
+            if ((int32_t)track[i].walk.n > m) {
+                ridge_peak(&track[i].walk, &ridge[i], blur, m, &track[i].profile, &marks[i]);
+            }
+        }
+    }
+    for (uint32_t i = 0; i < n; i++) {
+        profile_pick(&track[i].walk, &marks[i], &track[i].profile);
+        sums_take(&track[i].profile, track[i].profile.place, track[i].walk.far_px, track[i].sums);
     }
 }
 
@@ -382,14 +398,16 @@ KERNEL_INLINE oc_lanes_t ring_take(const oc_ring_table_t *table, const int16_t *
     }
     const oc_ints_t is_front = sum > 0;
     const oc_ints_t n_steady = (is_front & n_front) | (~is_front & n_back);
-    return lanes_where(n_steady >= (int32_t)OC_RING_SAMPLES - 1, __builtin_convertvector(sum, oc_lanes_t) * (1.0f / OC_RING_SAMPLES));
+    return lanes_where(n_steady >= (int32_t)OC_RING_SAMPLES - 1,
+                       __builtin_convertvector(sum, oc_lanes_t) * (1.0f / OC_RING_SAMPLES));
 }
 
 static uint32_t kernel_ring(const oc_ring_table_t *table, const int16_t *apex, float floor, float contrast,
                             float ring[OC_RAYS])
 {
     float closed[OC_RAYS + 2u]; /* one direction more at either end */
-    for (uint32_t d = 0; d < OC_RAYS; d += OC_LANES) lanes_store(closed + 1 + d, ring_take(table, apex, (int32_t)floor, d));
+    for (uint32_t d = 0; d < OC_RAYS; d += OC_LANES)
+        lanes_store(closed + 1 + d, ring_take(table, apex, (int32_t)floor, d));
     closed[0] = closed[OC_RAYS];
     closed[OC_RAYS + 1u] = closed[1];
     memcpy(ring, closed + 1, OC_RAYS * sizeof ring[0]);
