@@ -131,9 +131,13 @@ static void profile_of(const oc_kernels_t *kernels, const fan_t *fan, const oc_f
     }
     const double sd = sqrt(fan->s2), along = fan_along_sd(fan);
     const oc_fit_blur_t blur = {(float)sd, (float)along, (float)(1 / sd), (float)(1 / along), (float)(1 / fan->s2)};
-    memset(profile, 0, sizeof *profile);
+    static oc_fit_track_t track;
+    memset(&track, 0, sizeof track);
     memset(sums, 0, sizeof *sums);
-    kernels->follow(walk, &crowd, &blur, profile, sums);
+    track.walk = *walk;
+    track.sums = sums;
+    kernels->follow(&track, 1, &crowd, &blur);
+    *profile = track.profile;
 }
 
 static fan_t fan_any(kernel_random_t *random)
