@@ -77,21 +77,19 @@ static inline void kernel_planes_fill(kernel_random_t *random, kernel_planes_t *
     }
 }
 
-/* The search's own tables, or samples anywhere within 8 px. */
+/* A table as the search makes it: any radius, samples and misses. */
 static inline void kernel_table_any(kernel_random_t *random, oc_ray_table_t *table)
 {
-    const bool is_wild = kernel_below(random, 3) == 0;
-    table->n_samples = kernel_below(random, OC_RAY_MAX_SAMPLES) + 1u;
+    const int32_t radius = (int32_t)kernel_below(random, 4) + 5;
+    table->n_samples = (uint32_t)radius - 1u;
     table->n_spare = kernel_below(random, 4);
     memset(table->dx, 0, sizeof table->dx);
     memset(table->dy, 0, sizeof table->dy);
     for (uint32_t d = 0; d < OC_RAYS; d++) {
         for (uint32_t s = 0; s < table->n_samples; s++) {
-            const double angle = d * 6.283185307179586 / OC_RAYS, t = 8.0 - s;
-            table->dx[d][s] =
-                (int8_t)(is_wild ? (int32_t)kernel_below(random, 17) - 8 : (int32_t)lrint(t * cos(angle)));
-            table->dy[d][s] =
-                (int8_t)(is_wild ? (int32_t)kernel_below(random, 17) - 8 : (int32_t)lrint(t * sin(angle)));
+            const double angle = d * 6.283185307179586 / OC_RAYS, t = radius - (int32_t)s;
+            table->dx[d][s] = (int8_t)lrint(t * cos(angle));
+            table->dy[d][s] = (int8_t)lrint(t * sin(angle));
         }
     }
 }

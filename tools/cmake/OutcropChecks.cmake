@@ -67,7 +67,7 @@ endfunction()
 function(outcrop_check_headers directory)
   file(GLOB headers CONFIGURE_DEPENDS RELATIVE ${CMAKE_SOURCE_DIR}/lib ${CMAKE_SOURCE_DIR}/lib/${directory}/*.h)
   # Code that is compiled several times over, with flags of its own, and what only it includes.
-  list(FILTER headers EXCLUDE REGEX "/(simd|kernels_[a-z]+)\\.h$")
+  list(FILTER headers EXCLUDE REGEX "/(simd|kernels_[a-z_]+)\\.h$")
   set(sources)
   foreach(header ${headers})
     foreach(language ${ARGN})
