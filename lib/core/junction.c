@@ -19,6 +19,7 @@ static bool is_straight(float a_rad, float b_rad)
 oc_junction_kind_t oc_junction_kind_of(const oc_branch_t branch[], unsigned n_branches)
 {
     OC_ASSERT(branch || n_branches == 0);
+    if (n_branches == 1) return OC_KIND_CORNER;
     if (n_branches == 2) return OC_KIND_L;
     if (n_branches == 4) return OC_KIND_X;
     if (n_branches != 3) return OC_KIND_OTHER;
