@@ -104,9 +104,8 @@ static void the_corner_of_a_quadrant_is_found_wherever_it_lies_and_however_it_is
     }
     const double mean = sum / n, spread = sqrt(squares / n - mean * mean);
     char text[160];
-    snprintf(text, sizeof text, "inwards %.3f px, sd %.3f px, across at most %.3f px, orientation %.4f rad", mean, spread,
-             worst_across, worst_turn);
-    puts(text);
+    snprintf(text, sizeof text, "inwards %.3f px, sd %.3f px, across at most %.3f px, orientation %.4f rad", mean,
+             spread, worst_across, worst_turn);
     TEST_ASSERT_TRUE_MESSAGE(fabs(mean - 0.67) < 0.05 && spread < 0.1 && worst_across < 0.2 && worst_turn < 0.15, text);
 }
 
@@ -222,7 +221,6 @@ static void a_turned_image_has_the_same_corners_turned(void)
             n_same += gap < 0.05 && edge_between((double)found[k].branch[0].angle_rad, turned) < 0.1;
         }
     }
-    printf("same %u of %u\n", n_same, n);
     TEST_ASSERT_TRUE(n_same * 100 >= n * 95); /* the filter's rounding is not symmetric */
 }
 
@@ -231,21 +229,20 @@ static void a_turned_image_has_the_same_corners_turned(void)
 static void a_limit_is_shared_over_the_image(void)
 {
     make(WIDE, HIGH, 40, OC_SIMD_AUTO);
-    render_spots(120, 0, 100);
-    render_spots(25, 100, WIDE);
+    render_spots(70, 0, 100);
+    render_spots(45, 100, WIDE);
     const uint32_t n_all = find(1.0f, OC_MAX_JUNCTIONS);
-    for (uint32_t i = 1; i < n_all; i++) TEST_ASSERT_TRUE(found[i].score <= found[i - 1].score);
-    printf("NALL %u\n", n_all);
     TEST_ASSERT_TRUE(n_all > 80);
+    uint32_t n_strong_right = 0, n_right = 0;
+    for (uint32_t i = 0; i < 40; i++) n_strong_right += found[i].x_px > 100.0f;
     const uint32_t n = find(1.0f, 40);
     TEST_ASSERT_EQUAL_UINT32(40, n);
-    uint32_t n_weak = 0;
     for (uint32_t i = 0; i < n; i++) {
         check_corner(&found[i], WIDE, HIGH);
-        n_weak += found[i].x_px > 103.0f;
+        TEST_ASSERT_TRUE(i == 0 || found[i].score <= found[i - 1].score);
+        n_right += found[i].x_px > 100.0f;
     }
-    printf("weak %u\n", n_weak);
-    TEST_ASSERT_TRUE(n_weak >= 4);
+    TEST_ASSERT_TRUE(n_right > n_strong_right); /* the weaker half gets more than its strength alone would */
     TEST_ASSERT_EQUAL_UINT32(0, find(1.0f, 0));
 }
 
