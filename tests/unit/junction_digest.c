@@ -15,9 +15,9 @@
 
 #include "vehicle/judoca.h"
 
-#define N_METHODS 3
+#define N_METHODS 4
 
-static const char *const method_name[N_METHODS] = {"default", "fixed", "thesis"};
+static const char *const method_name[N_METHODS] = {"default", "fixed", "thesis", "corners"};
 
 static uint8_t *px;
 static uint32_t width_px, height_px;
@@ -27,8 +27,9 @@ static int is_listing, only_method = -1, n_frames = -1;
 static oc_judoca_params_t params_of(int method)
 {
     oc_judoca_params_t params = oc_judoca_defaults();
-    if (method > 0) params.lambda_min_px = params.lambda_px = 10;
-    if (method > 1) params.method = OC_JUDOCA_THESIS;
+    if (method == 1 || method == 2) params.lambda_min_px = params.lambda_px = 10;
+    if (method == 2) params.method = OC_JUDOCA_THESIS;
+    if (method == 3) params.max_corners = 300;
     return params;
 }
 
@@ -152,7 +153,8 @@ static const char *short_name(const char *path)
 
 static int usage(void)
 {
-    fprintf(stderr, "usage: junction_digest [--list] [--frames N] [--method default|fixed|thesis] [FILE.pgm...]\n");
+    fprintf(stderr,
+            "usage: junction_digest [--list] [--frames N] [--method default|fixed|thesis|corners] [FILE.pgm...]\n");
     return 2;
 }
 
