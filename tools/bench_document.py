@@ -6,7 +6,7 @@ SET_NAMES = {"cells": "Cells (one junction each, two to four branches)", "polys"
 METHOD_NAMES = {"fixed": "ours, lambda", "grown": "ours, grown branches (default)",
                 "grown-auto": "ours, grown, t_b from the noise", "thesis": "thesis as printed, lambda",
                 "gftt+subpix": "GFTT + cornerSubPix, told the count", "bound": "bound: noise alone, lambda"}
-DETECTORS = ["ours", "harris", "gftt", "fast", "orb", "sift", "thesis"]
+DETECTORS = ["ours", "harris", "gftt", "fast", "orb", "sift", "thesis", "ours+corners"]
 
 
 def number(value, places=0):
@@ -125,12 +125,13 @@ def repeatability_section(bench):
     rows = bench.get("repeatability", {}).get("rows")
     if not rows:
         return ""
+    shown_names = [name for name in DETECTORS if any(row["detector"] == name for row in rows)]
     cells = []
     for key in unique((row["set"], row["variance"], row["warp"]) for row in rows):
         here = {row["detector"]: row["figures"] for row in rows if (row["set"], row["variance"], row["warp"]) == key}
         best = max(figures["repeatability"] for figures in here.values())
         cells.append([f"{key[0]}, {key[2]}", key[1], number(here["ours"]["n"])])
-        for name in DETECTORS:
+        for name in shown_names:
             share = here[name]["repeatability"] if name in here else None
             shown = number(share, 3)
             cells[-1].append(f"**{shown}**" if share == best else shown)
@@ -138,7 +139,7 @@ def repeatability_section(bench):
             "pair as ours finds in both views (at most 300 structured, 100 natural); the best of each row in bold. "
             "Structured: polygons and chessboards drawn exactly again under the homography. Natural: crops of site "
             "pictures (`tests/bench/natural.json`), warped.\n\n")
-    text += table(["views", "noise variance", "points"] + DETECTORS, cells)
+    text += table(["views", "noise variance", "points"] + shown_names, cells)
     skipped = bench["repeatability"]["skipped"]
     if skipped:
         text += "\n**Left out, since the pictures were not there: " + "; ".join(skipped) + ".**\n"

@@ -27,7 +27,7 @@ typedef struct yaml_margins {
 
 typedef struct yaml_junctions {
     double *sigma_px, *t_b, *s_j;
-    uint32_t *lambda_px, *lambda_min_px, *max_found, *max_sent;
+    uint32_t *lambda_px, *lambda_min_px, *max_found, *max_corners, *max_sent;
     char *method;
 } yaml_junctions_t;
 
@@ -67,6 +67,7 @@ static const cyaml_schema_field_t junction_fields[] = {
     CYAML_FIELD_UINT_PTR("lambda_px", OPTIONAL_POINTER, yaml_junctions_t, lambda_px),
     CYAML_FIELD_UINT_PTR("lambda_min_px", OPTIONAL_POINTER, yaml_junctions_t, lambda_min_px),
     CYAML_FIELD_UINT_PTR("max_found", OPTIONAL_POINTER, yaml_junctions_t, max_found),
+    CYAML_FIELD_UINT_PTR("max_corners", OPTIONAL_POINTER, yaml_junctions_t, max_corners),
     CYAML_FIELD_UINT_PTR("max_sent", OPTIONAL_POINTER, yaml_junctions_t, max_sent),
     CYAML_FIELD_STRING_PTR("method", OPTIONAL_POINTER, yaml_junctions_t, method, 1, 16),
     CYAML_FIELD_END};
@@ -151,6 +152,7 @@ static void take_junctions(config_reader_t *r, const yaml_junctions_t *junctions
     p->lambda_min_px =
         (int32_t)pick_uint(r, "junctions.lambda_min_px", junctions->lambda_min_px, 4, (uint32_t)p->lambda_px, shortest);
     p->max_junctions = pick_uint(r, "junctions.max_found", junctions->max_found, 1, OC_MAX_JUNCTIONS, p->max_junctions);
+    p->max_corners = pick_uint(r, "junctions.max_corners", junctions->max_corners, 0, OC_MAX_JUNCTIONS, p->max_corners);
     config->vehicle.max_sent_junctions = pick_uint(r, "junctions.max_sent", junctions->max_sent, 1, OC_MAX_JUNCTIONS,
                                                    config->vehicle.max_sent_junctions);
     const char *method = junctions->method ? junctions->method : "best";

@@ -33,6 +33,7 @@ uint8_t oc_junction_straight_branches(const oc_branch_t branch[], unsigned n_bra
 oc_junction_kind_t oc_junction_kind_of(const oc_branch_t branch[], unsigned n_branches)
 {
     OC_ASSERT(branch || n_branches == 0);
+    if (n_branches == 1) return OC_KIND_CORNER;
     if (n_branches == 2) return OC_KIND_L;
     if (n_branches == 4) return OC_KIND_X;
     if (n_branches != 3) return OC_KIND_OTHER;

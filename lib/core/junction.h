@@ -32,7 +32,8 @@ typedef enum oc_junction_kind {
     OC_KIND_L = 1,     /* two branches */
     OC_KIND_T = 2,     /* three, two of them collinear */
     OC_KIND_Y = 3,     /* three, none collinear */
-    OC_KIND_X = 4      /* four */
+    OC_KIND_X = 4,     /* four */
+    OC_KIND_CORNER = 5 /* one that is no edge but the orientation of a corner */
 } oc_junction_kind_t;
 
 typedef struct oc_branch {
@@ -53,8 +54,8 @@ typedef struct oc_junction {
 } oc_junction_t;
 
 /* The kind that the number and directions of branches say, angles in [0, 2 pi):
- * three of which two are collinear within 12 degrees are a T. Fewer than two
- * are OC_KIND_OTHER. */
+ * three of which two are collinear within 12 degrees are a T. One is a corner,
+ * none is OC_KIND_OTHER. */
 oc_junction_kind_t oc_junction_kind_of(const oc_branch_t branch[], unsigned n_branches);
 
 /* Two branches, angles in [0, 2 pi), that are one straight edge through the

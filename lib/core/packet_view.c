@@ -20,6 +20,9 @@ static_assert(OC_MAX_TIES <= 127, "the count of ties has 7 bits");
 
 #define MIN_BRANCHES 2u
 
+/* A corner's one direction travels as a pair of two equal ones, which no junction has. */
+#define CORNER_BRANCHES 1u
+
 /* No junction is shorter: gap, column, branches, label, two angles. */
 #define JUNCTION_MIN_BITS 14u
 
@@ -55,7 +58,8 @@ static float angle_from_wire(uint32_t code)
 }
 
 /* The angles of a junction in wire units, ascending; order[] says which branch
- * each came from (a direction just below 2 pi rounds to 0 and moves to the front). */
+ * each came from (a direction just below 2 pi rounds to 0 and moves to the front).
+ * Two that round to the same are kept apart, as equal ones are a corner. */
 static void angles_to_wire(const oc_junction_t *junction, uint32_t angles[OC_MAX_BRANCHES],
                            uint8_t order[OC_MAX_BRANCHES])
 {
@@ -69,6 +73,13 @@ static void angles_to_wire(const oc_junction_t *junction, uint32_t angles[OC_MAX
         angles[at] = angle;
         order[at] = i;
     }
+    if (junction->n_branches == MIN_BRANCHES && angles[0] == angles[1]) {
+        if (angles[1] < ANGLES - 1u) {
+            angles[1]++;
+        } else {
+            angles[0]--;
+        }
+    }
 }
 
 /* ---- checks before encoding ---- */
@@ -79,7 +90,7 @@ static bool junction_can_travel(const oc_junction_t *junction, const oc_intrinsi
     const float turn = 6.28318548f;
     if (!position_is_inside(junction->x_px, k->width_px)) return false;
     if (!position_is_inside(junction->y_px, k->height_px)) return false;
-    if (junction->n_branches < MIN_BRANCHES || junction->n_branches > OC_MAX_BRANCHES) return false;
+    if (junction->n_branches < CORNER_BRANCHES || junction->n_branches > OC_MAX_BRANCHES) return false;
     if (junction->label > OC_LABEL_GROUND) return false;
     for (uint8_t i = 0; i < junction->n_branches; i++) {
         const float angle = junction->branch[i].angle_rad;
@@ -192,10 +203,11 @@ static void junction_put_directions(oc_bit_writer_t *writer, const oc_junction_t
     uint32_t angles[OC_MAX_BRANCHES];
     uint8_t order[OC_MAX_BRANCHES];
     angles_to_wire(junction, angles, order);
-    oc_bits_put_unary(writer, junction->n_branches - MIN_BRANCHES, OC_MAX_BRANCHES - MIN_BRANCHES);
+    const bool is_corner = junction->n_branches == CORNER_BRANCHES;
+    oc_bits_put_unary(writer, is_corner ? 0 : junction->n_branches - MIN_BRANCHES, OC_MAX_BRANCHES - MIN_BRANCHES);
     oc_packet_put_label(writer, junction->label, common);
-    if (junction->n_branches == 2) {
-        pair_put(writer, angles[0], angles[1]);
+    if (junction->n_branches <= MIN_BRANCHES) {
+        pair_put(writer, angles[0], is_corner ? angles[0] : angles[1]);
         return;
     }
     uint32_t previous = 0;
@@ -408,12 +420,18 @@ oc_status_t oc_packet_encode_view(const oc_packet_head_t *packet, const oc_view_
  * The same code runs twice: first with part == NULL, which checks everything,
  * then to fill a part, which at 90 kB is too large for a copy on the stack. */
 
-static void pair_get(oc_bit_reader_t *reader, oc_branch_t branch[2])
+/* Returns the number of branches, 1 or 2. */
+static unsigned pair_get(oc_bit_reader_t *reader, oc_branch_t branch[2])
 {
     const uint32_t start = oc_bits_get(reader, 9);
     const uint32_t end = (start + oc_bits_get_uniform(reader, ANGLES / 2u + 1u)) % ANGLES;
+    if (start == end) {
+        branch[0].angle_rad = angle_from_wire(start);
+        return CORNER_BRANCHES;
+    }
     branch[0].angle_rad = angle_from_wire(start < end ? start : end);
     branch[1].angle_rad = angle_from_wire(start < end ? end : start);
+    return MIN_BRANCHES;
 }
 
 static void fan_get(oc_bit_reader_t *reader, unsigned n, oc_branch_t branch[])
@@ -431,7 +449,7 @@ static void junction_get_directions(oc_bit_reader_t *reader, uint8_t common, oc_
     junction->n_branches = (uint8_t)(MIN_BRANCHES + more);
     junction->label = oc_packet_get_label(reader, common);
     if (more == 0) {
-        pair_get(reader, junction->branch);
+        junction->n_branches = (uint8_t)pair_get(reader, junction->branch);
     } else {
         fan_get(reader, junction->n_branches, junction->branch);
     }

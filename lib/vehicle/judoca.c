@@ -30,6 +30,7 @@ oc_judoca_params_t oc_judoca_defaults(void)
         .max_apex_sigma_px = 1.0f,
         .min_distance_px = 3.0f,
         .max_junctions = 600,
+        .max_corners = 0,
         .max_candidates = 0,
         .spread_cell_px = 40,
         .method = OC_JUDOCA_REFINED,
@@ -52,7 +53,7 @@ bool oc_judoca_params_are_valid(const oc_judoca_params_t *p)
            p->lambda_min_px >= 4 && p->lambda_min_px <= p->lambda_px && in_range(p->min_angle_rad, 0.1f, 1.0f) &&
            in_range(p->min_bend_rad, 0.05f, 1.0f) && in_range(p->max_rms_px, 0.1f, 2.0f) &&
            in_range(p->max_apex_sigma_px, 0.1f, 3.0f) && in_range(p->min_distance_px, 1.0f, 20.0f) &&
-           p->max_junctions >= 1 && p->max_junctions <= OC_MAX_JUNCTIONS &&
+           p->max_junctions >= 1 && p->max_junctions <= OC_MAX_JUNCTIONS && p->max_corners <= OC_MAX_JUNCTIONS &&
            (p->max_candidates == 0 || p->max_candidates >= 16) && p->max_candidates <= OC_JUDOCA_MAX_CANDIDATES &&
            p->spread_cell_px >= 8 && p->spread_cell_px <= OC_MAX_IMAGE_SIDE &&
            (p->method == OC_JUDOCA_REFINED || p->method == OC_JUDOCA_THESIS) &&
@@ -89,8 +90,10 @@ size_t oc_judoca_size_bytes(uint32_t width_px, uint32_t height_px, const oc_judo
     const judoca_pieces_t p = judoca_measure(width_px, height_px, params);
     const size_t method = params->method == OC_JUDOCA_THESIS ? oc_judoca_thesis_size_bytes(width_px, height_px, params)
                                                              : oc_search_size_bytes(width_px, height_px);
-    return OC_ARENA_ALIGN + gradient + method + oc_arena_cost(p.done) + oc_arena_cost(p.found) + oc_arena_cost(p.rank) +
-           oc_arena_cost(p.next) + oc_arena_cost(p.owner) + oc_arena_cost(p.cell);
+    const size_t corner =
+        params->max_corners > 0 ? oc_corner_size_bytes(width_px, height_px, params->spread_cell_px) : 0;
+    return OC_ARENA_ALIGN + gradient + method + corner + oc_arena_cost(p.done) + oc_arena_cost(p.found) +
+           oc_arena_cost(p.rank) + oc_arena_cost(p.next) + oc_arena_cost(p.owner) + oc_arena_cost(p.cell);
 }
 
 oc_status_t oc_judoca_init(oc_judoca_ws_t *ws, oc_arena_t *arena, uint32_t width_px, uint32_t height_px,
@@ -109,6 +112,10 @@ oc_status_t oc_judoca_init(oc_judoca_ws_t *ws, oc_arena_t *arena, uint32_t width
     void *piece[6];
     for (uint32_t i = 0; i < 6; i++) {
         status = oc_arena_take(arena, bytes[i], &piece[i]);
+        if (status != OC_OK) return status;
+    }
+    if (params->max_corners > 0) {
+        status = oc_corner_init(&ws->corner, arena, width_px, height_px, params->spread_cell_px);
         if (status != OC_OK) return status;
     }
     ws->params = *params;
@@ -337,6 +344,7 @@ oc_status_t oc_judoca_detect(oc_judoca_ws_t *ws, const oc_image_t *grey, oc_junc
         ws->stats.n_places = ws->search.n_places;
         fit_places(ws);
     }
+    if (ws->params.max_corners > 0) oc_judoca_add_corners(ws);
     *count = oc_judoca_select(ws, out, cap);
     return OC_OK;
 }

@@ -11,6 +11,7 @@
 #include "core/junction.h"
 #include "core/status.h"
 #include "vehicle/arena.h"
+#include "vehicle/corner.h"
 #include "vehicle/gradient.h"
 #include "vehicle/judoca_search.h"
 
@@ -51,6 +52,8 @@ typedef struct oc_judoca_params {
     float max_apex_sigma_px; /* an apex less certain than this is dropped, 0.1..3; 1 */
     float min_distance_px;   /* of two apices nearer than this the better stays, 1..20; 3 */
     uint32_t max_junctions;  /* kept per image, 1..OC_MAX_JUNCTIONS; 600 */
+    uint32_t max_corners;    /* corners (corner.h) found beside the junctions, 0..OC_MAX_JUNCTIONS; they share
+                              * max_junctions and min_distance_px with these by score. 0 = none; 0 */
     uint32_t max_candidates; /* places fitted per image, those of best pre-score, shared over the image,
                               * 16..OC_JUDOCA_MAX_CANDIDATES; 0 = OC_JUDOCA_LEAST_CANDIDATES and one per
                               * pixels. Bounds the time; 0 */
@@ -71,6 +74,7 @@ typedef struct oc_judoca_stats {
     uint32_t n_places;  /* places that looked like a junction */
     uint32_t n_fitted;  /* of these, within max_candidates */
     uint32_t n_found;   /* junctions before max_junctions and cap */
+    uint32_t n_corners; /* of these, corners that were found beside the junctions */
     uint32_t n_dropped; /* junctions lost to max_junctions or cap */
 } oc_judoca_stats_t;
 
@@ -96,6 +100,7 @@ typedef struct oc_judoca_ws {
     uint16_t *next;                  /* [OC_JUDOCA_MAX_FOUND] list of the junctions in one square of the owner map */
     uint16_t *owner;                 /* first junction of each square, + 1 */
     uint16_t *cell;                  /* junctions met per spread cell */
+    oc_corner_ws_t corner;           /* with max_corners only */
     struct oc_judoca_thesis *thesis; /* the literal method's tables, NULL with the other */
 } oc_judoca_ws_t;
 

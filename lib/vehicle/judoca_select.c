@@ -11,6 +11,12 @@
 /* Junctions that a cell gets when all are alike. */
 #define CELL_SHARE 2.0f
 
+/* Least strength of a corner as a share of t_b. */
+#define CORNER_FLOOR 0.5f
+
+/* A corner this near to a junction is the same point of the scene. */
+#define SAME_POINT_PX 1.0f
+
 /* Side of an owner square. */
 #define SQUARE_PX 8u
 
@@ -56,45 +62,80 @@ size_t oc_judoca_owner_squares(uint32_t width_px, uint32_t height_px)
     return (size_t)owner_columns(width_px) * ((height_px + SQUARE_PX - 1u) / SQUARE_PX);
 }
 
-/* Is a better junction, already on the owner map, within the distance? */
-static bool select_is_near(const oc_judoca_ws_t *ws, const oc_junction_t *j)
+static void owner_clear(const oc_judoca_ws_t *ws)
 {
-    const float limit = ws->params.min_distance_px;
+    memset(ws->owner, 0, oc_judoca_owner_squares(ws->gradient.width_px, ws->gradient.height_px) * sizeof ws->owner[0]);
+}
+
+static void owner_add(const oc_judoca_ws_t *ws, uint32_t index)
+{
+    const oc_junction_t *j = &ws->found[index];
+    uint16_t *owner = &ws->owner[(uint32_t)j->y_px / SQUARE_PX * owner_columns(ws->gradient.width_px) +
+                                 (uint32_t)j->x_px / SQUARE_PX];
+    ws->next[index] = *owner;
+    *owner = (uint16_t)(index + 1u);
+}
+
+static bool is_in_image(const oc_gradient_t *g, const oc_junction_t *j)
+{
+    return j->x_px >= 0.0f && j->y_px >= 0.0f && j->x_px <= (float)(g->width_px - 1u) &&
+           j->y_px <= (float)(g->height_px - 1u);
+}
+
+/* The best on the owner map within the distance, NULL when there is none. */
+static oc_junction_t *owner_best_near(const oc_judoca_ws_t *ws, const oc_junction_t *j, float limit)
+{
     const int32_t cols = (int32_t)owner_columns(ws->gradient.width_px);
     const int32_t rows = (int32_t)owner_columns(ws->gradient.height_px);
     const int32_t reach = (int32_t)limit / (int32_t)SQUARE_PX + 1;
     const int32_t col = (int32_t)j->x_px / (int32_t)SQUARE_PX, row = (int32_t)j->y_px / (int32_t)SQUARE_PX;
+    oc_junction_t *best = NULL;
     for (int32_t y = row > reach ? row - reach : 0; y <= row + reach && y < rows; y++) {
         for (int32_t x = col > reach ? col - reach : 0; x <= col + reach && x < cols; x++) {
             for (uint32_t i = ws->owner[y * cols + x]; i != 0; i = ws->next[i - 1u]) {
-                const float ex = ws->found[i - 1u].x_px - j->x_px;
-                const float ey = ws->found[i - 1u].y_px - j->y_px;
-                if (ex * ex + ey * ey < limit * limit) return true;
+                oc_junction_t *other = &ws->found[i - 1u];
+                const float ex = other->x_px - j->x_px, ey = other->y_px - j->y_px;
+                const bool is_near = ex * ex + ey * ey < limit * limit;
+                if (is_near && (!best || other->score > best->score)) best = other;
             }
         }
     }
-    return false;
+    return best;
+}
+
+void oc_judoca_add_corners(oc_judoca_ws_t *ws)
+{
+    const uint32_t n_junctions = ws->stats.n_found, room = OC_JUDOCA_MAX_FOUND - n_junctions;
+    oc_junction_t *corner = ws->found + n_junctions;
+    const uint32_t n = oc_corner_find(&ws->corner, &ws->gradient, CORNER_FLOOR * ws->stats.t_b, corner,
+                                      ws->params.max_corners < room ? ws->params.max_corners : room);
+    owner_clear(ws);
+    for (uint32_t i = 0; i < n_junctions; i++) {
+        if (is_in_image(&ws->gradient, &ws->found[i])) owner_add(ws, i);
+    }
+    uint32_t kept = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        oc_junction_t *near = owner_best_near(ws, &corner[i], SAME_POINT_PX);
+        if (!near) {
+            corner[kept++] = corner[i];
+        } else if (near->score < corner[i].score) {
+            near->score = corner[i].score;
+        }
+    }
+    ws->stats.n_corners = kept;
+    ws->stats.n_found += kept;
 }
 
 /* Keep the ranked junctions that are inside the image and not near a better one. */
 static uint32_t select_dedupe(oc_judoca_ws_t *ws, uint32_t n)
 {
-    const oc_gradient_t *g = &ws->gradient;
-    memset(ws->owner, 0, oc_judoca_owner_squares(g->width_px, g->height_px) * sizeof ws->owner[0]);
-
+    owner_clear(ws);
     uint32_t kept = 0;
     for (uint32_t i = 0; i < n; i++) {
         const uint32_t index = ws->rank[i].index;
         const oc_junction_t *j = &ws->found[index];
-        if (!(j->x_px >= 0.0f && j->y_px >= 0.0f && j->x_px <= (float)(g->width_px - 1u) &&
-              j->y_px <= (float)(g->height_px - 1u))) {
-            continue;
-        }
-        if (select_is_near(ws, j)) continue;
-        uint16_t *owner =
-            &ws->owner[(uint32_t)j->y_px / SQUARE_PX * owner_columns(g->width_px) + (uint32_t)j->x_px / SQUARE_PX];
-        ws->next[index] = *owner;
-        *owner = (uint16_t)(index + 1u);
+        if (!is_in_image(&ws->gradient, j) || owner_best_near(ws, j, ws->params.min_distance_px)) continue;
+        owner_add(ws, index);
         ws->rank[kept++] = ws->rank[i];
     }
     return kept;

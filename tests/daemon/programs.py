@@ -114,6 +114,7 @@ def check_vehicle_config(s):
         ({"margins": {"position_m": ".nan"}}, ": position_m: "), ({"margins": {"position_m": "nan"}}, "margins.position_m"),
         ({"margins": {"angle_deg": "wide"}}, "angle_deg"), ({"junctions": {"sigma_px": "0.1"}}, "junctions.sigma_px"),
         ({"junctions": {"lambda_px": "5"}}, "junctions.lambda_px"), ({"junctions": {"max_sent": "0"}}, "junctions.max_sent"),
+        ({"junctions": {"max_corners": "1025"}}, "junctions.max_corners"),
         ({"junctions": {"method": "worst"}}, "junctions.method"), ({"junctions": {"t_b": "inf"}}, "junctions.t_b"),
     ]
     for change, *parts in faults:

@@ -63,13 +63,14 @@ static void check_junction(const oc_junction_t *junction, const oc_intrinsics_t 
 {
     REQUIRE("I5", is_inside(junction->x_px, k->width_px) && is_inside(junction->y_px, k->height_px));
     REQUIRE("I5", is_multiple(junction->x_px, 8.0f) && is_multiple(junction->y_px, 8.0f));
-    REQUIRE("I6", junction->n_branches >= 2 && junction->n_branches <= OC_MAX_BRANCHES && junction->label <= 2);
+    REQUIRE("I6", junction->n_branches >= 1 && junction->n_branches <= OC_MAX_BRANCHES && junction->label <= 2);
     REQUIRE("I6", junction->kind == oc_junction_kind_of(junction->branch, junction->n_branches));
     REQUIRE("I6", junction->confidence == 0);
     for (unsigned b = 0; b < junction->n_branches; b++) {
         const oc_branch_t *branch = &junction->branch[b];
         REQUIRE("I6", branch->angle_rad >= 0.0f && branch->angle_rad < 6.2831853f);
         REQUIRE("I6", b == 0 || branch->angle_rad >= junction->branch[b - 1].angle_rad);
+        REQUIRE("I6", b != 1 || junction->n_branches != 2 || branch->angle_rad > junction->branch[0].angle_rad);
         REQUIRE("I6", branch->length_px == 0.0f && branch->strength == 0.0f);
     }
 }

@@ -16,9 +16,9 @@
 
 #include "vehicle/judoca.h"
 
-#define N_METHODS 3
+#define N_METHODS 4
 
-static const char *const method_name[N_METHODS] = {"default", "fixed", "thesis"};
+static const char *const method_name[N_METHODS] = {"default", "fixed", "thesis", "corners"};
 
 static uint8_t *px;
 static uint32_t width_px, height_px;
@@ -28,8 +28,9 @@ static int is_listing, is_comparing, only_method = -1, n_frames = -1;
 static oc_judoca_params_t params_of(int method)
 {
     oc_judoca_params_t params = oc_judoca_defaults();
-    if (method > 0) params.lambda_min_px = params.lambda_px = 10;
-    if (method > 1) params.method = OC_JUDOCA_THESIS;
+    if (method == 1 || method == 2) params.lambda_min_px = params.lambda_px = 10;
+    if (method == 2) params.method = OC_JUDOCA_THESIS;
+    if (method == 3) params.max_corners = 300;
     return params;
 }
 
@@ -207,7 +208,8 @@ static const char *short_name(const char *path)
 static int usage(void)
 {
     fprintf(stderr,
-            "usage: junction_digest [--list] [--frames N] [--method default|fixed|thesis] [--levels] [FILE.pgm...]\n");
+            "usage: junction_digest [--list] [--frames N] [--method default|fixed|thesis|corners] [--levels] [FILE.pgm...]
+");
     return 2;
 }
 

@@ -219,10 +219,62 @@ static void places_at_the_borders_stay_inside(void)
     TEST_ASSERT_TRUE(has_wrapped);
 }
 
+static void corners_come_back_beside_junctions(void)
+{
+    uint32_t state = SEED;
+    const oc_view_head_t head = example_view_head(&state);
+    example_junctions(&state, &head.camera.k, 60, 4, 3, junctions);
+    for (int i = 0; i < 60; i++) {
+        junctions[i].confidence = (uint8_t)i;
+        if (i % 3 == 0) junctions[i].n_branches = 1;
+    }
+    junctions[0].branch[0].angle_rad = 6.2831f; /* rounds to 0 */
+    memcpy(original, junctions, sizeof original);
+    uint16_t taken, tied;
+    TEST_ASSERT_EQUAL(OC_OK, encode_view(&head, 60, 0, 0, 0, sizeof buf, &taken, &tied));
+    TEST_ASSERT_EQUAL_UINT16(60, taken);
+    TEST_ASSERT_EQUAL(OC_OK, oc_packet_decode_view(buf, n_bytes, &part));
+    int n_corners = 0;
+    for (int i = 0; i < 60; i++) {
+        const oc_junction_t *got = &part.junctions[i], *mine = &junctions[i];
+        check_junction(mine, got);
+        TEST_ASSERT_EQUAL_UINT8(original[mine->confidence].n_branches, got->n_branches);
+        TEST_ASSERT_TRUE((got->n_branches == 1) == (got->kind == OC_KIND_CORNER));
+        TEST_ASSERT_TRUE(got->kind == mine->kind && (got->n_branches > 1 || got->branch[1].angle_rad == 0.0f));
+        if (mine->confidence == 0) TEST_ASSERT_TRUE(got->branch[0].angle_rad == 0.0f);
+        n_corners += got->n_branches == 1;
+    }
+    TEST_ASSERT_EQUAL_INT(20, n_corners);
+}
+
+/* Equal directions mean a corner: a junction's two that round to the same are sent a unit apart. */
+static void a_junction_s_two_branches_never_arrive_as_a_corner(void)
+{
+    uint32_t state = SEED;
+    const oc_view_head_t head = example_view_head(&state);
+    const float angle_rad[3] = {0.0f, 1.0f, 6.275f}; /* the last unit is 6.2709 */
+    for (int i = 0; i < 3; i++) {
+        example_junctions(&state, &head.camera.k, 1, 2, 3, junctions);
+        junctions[0].branch[0].angle_rad = angle_rad[i];
+        junctions[0].branch[1].angle_rad = angle_rad[i] + 0.0001f;
+        uint16_t taken, tied;
+        TEST_ASSERT_EQUAL(OC_OK, encode_view(&head, 1, 0, 0, 0, sizeof buf, &taken, &tied));
+        TEST_ASSERT_EQUAL(OC_OK, oc_packet_decode_view(buf, n_bytes, &part));
+        const oc_junction_t *got = &part.junctions[0];
+        TEST_ASSERT_TRUE(got->n_branches == 2 && got->kind == OC_KIND_L);
+        for (int b = 0; b < 2; b++) {
+            TEST_ASSERT_TRUE(got->branch[b].angle_rad == junctions[0].branch[b].angle_rad);
+            TEST_ASSERT_FLOAT_WITHIN(0.0185f, angle_rad[i], got->branch[b].angle_rad);
+        }
+        TEST_ASSERT_TRUE(got->branch[1].angle_rad > got->branch[0].angle_rad);
+    }
+}
+
 static void kinds_are_told_from_the_directions(void)
 {
     oc_branch_t branch[4] = {{.angle_rad = 0.1f}, {.angle_rad = 1.5f}, {.angle_rad = 3.1f}, {.angle_rad = 5.0f}};
-    TEST_ASSERT_EQUAL(OC_KIND_OTHER, oc_junction_kind_of(branch, 1));
+    TEST_ASSERT_EQUAL(OC_KIND_OTHER, oc_junction_kind_of(branch, 0));
+    TEST_ASSERT_EQUAL(OC_KIND_CORNER, oc_junction_kind_of(branch, 1));
     TEST_ASSERT_EQUAL(OC_KIND_L, oc_junction_kind_of(branch, 2));
     TEST_ASSERT_EQUAL(OC_KIND_T, oc_junction_kind_of(branch, 3)); /* 3.0 rad apart: 8 degrees off straight */
     TEST_ASSERT_EQUAL(OC_KIND_X, oc_junction_kind_of(branch, 4));
@@ -252,7 +304,7 @@ static void values_that_cannot_travel_are_refused_untouched(void)
         if (spoil == 7) head.utime_us = -1;
         if (spoil == 8) junctions[9].x_px = 639.5f;
         if (spoil == 9) junctions[9].y_px = NAN;
-        if (spoil == 10) junctions[9].n_branches = 1;
+        if (spoil == 10) junctions[9].n_branches = 0;
         if (spoil == 11) junctions[9].branch[1].angle_rad = 6.3f;
         if (spoil == 12) junctions[9].label = 3;
         if (spoil == 13) ties[4].ref_view = head.view;
@@ -492,6 +544,8 @@ int main(void)
     RUN_TEST(a_part_leaves_no_room_that_a_junction_would_fit);
     RUN_TEST(two_hundred_junctions_take_less_than_a_thousand_bytes);
     RUN_TEST(places_at_the_borders_stay_inside);
+    RUN_TEST(corners_come_back_beside_junctions);
+    RUN_TEST(a_junction_s_two_branches_never_arrive_as_a_corner);
     RUN_TEST(kinds_are_told_from_the_directions);
     RUN_TEST(values_that_cannot_travel_are_refused_untouched);
     RUN_TEST(a_buffer_too_small_is_refused_untouched);

@@ -37,13 +37,16 @@ std::vector<Detector> detectors()
     oc_judoca_params_t thesis = oc_judoca_defaults();
     thesis.lambda_min_px = thesis.lambda_px;
     thesis.method = OC_JUDOCA_THESIS;
+    oc_judoca_params_t corners = oc_judoca_defaults();
+    corners.max_corners = OC_MAX_JUNCTIONS;
     return {{"ours", judoca(oc_judoca_defaults())},
             {"harris", find_harris},
             {"gftt", [](const cv::Mat &grey) { return find_gftt(grey, 2000, 3, false); }},
             {"fast", find_fast},
             {"orb", find_orb},
             {"sift", find_sift},
-            {"thesis", judoca(thesis)}};
+            {"thesis", judoca(thesis)},
+            {"ours+corners", judoca(corners)}};
 }
 
 struct Pair {
