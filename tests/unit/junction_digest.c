@@ -207,9 +207,9 @@ static const char *short_name(const char *path)
 
 static int usage(void)
 {
-    fprintf(stderr,
-            "usage: junction_digest [--list] [--frames N] [--method default|fixed|thesis|corners] [--levels] [FILE.pgm...]
-");
+    fprintf(
+        stderr,
+        "usage: junction_digest [--list] [--frames N] [--method default|fixed|thesis|corners] [--levels] [FILE.pgm...]\n");
     return 2;
 }
 
