@@ -249,7 +249,7 @@ static void a_limit_on_the_fits_is_spread_over_the_picture(void)
     enum { SIDE = 512 };
     oc_judoca_params_t params = oc_judoca_defaults();
     const kind_t kinds[] = {NOISE, TILES, SATURATED};
-    const uint32_t limits[] = {1000, 200, 800}; /* of noise few make a junction, and a corner has several places */
+    const uint32_t limits[] = {1000, 400, 800}; /* of noise few make a junction, and a corner has several places */
     for (int k = 0; k < 3; k++) {
         const oc_image_t image = picture_make(kinds[k], SIDE, SIDE, SIDE);
         params.max_candidates = limits[k];
