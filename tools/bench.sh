@@ -47,9 +47,9 @@ grep SKIPPED "$scratch/speed.txt" >&2 || true
     { cat "$scratch/rivals.txt" >&2; exit 1; }
 if [ ${#quick[@]} -eq 0 ] && command -v valgrind >/dev/null && [ -x build-aarch64/tests/bin/junction_digest ]; then
     echo "bench: instructions" >&2
-    build/tests/bin/image_to_pgm tests/data/sites/depot/images/view_00.jpg "$scratch/depot_view_00.pgm"
+    build/tests/bin/image_to_pgm "$scratch" tests/data/sites/depot/images/view_00.jpg
     tools/bench/instructions.py --x86 build/tests/bin/junction_digest \
-        --aarch64 build-aarch64/tests/bin/junction_digest --json "$scratch/instructions.json" "$scratch/depot_view_00.pgm" \
+        --aarch64 build-aarch64/tests/bin/junction_digest --json "$scratch/instructions.json" "$scratch"/*.pgm \
         >"$scratch/instructions.txt" 2>&1 || { cat "$scratch/instructions.txt" >&2; exit 1; }
 fi
 echo "bench: ground" >&2
