@@ -9,8 +9,8 @@ LEFT, GAP = 50, 62
 WIDTH = LEFT + 2 * (PANEL_W + GAP) - GAP + 16
 OURS, THESIS = "#e0701f", "#8a63d2"
 VARIANCE_COLOURS = {0: "#35a06b", 100: "#3f8fd6", 400: "#e0701f", 1000: "#c43d5b"}
-DETECTOR_COLOURS = {"ours": OURS, "harris": "#3f8fd6", "gftt": "#35a06b", "fast": "#b8a11e", "orb": "#c43d5b",
-                    "sift": "#4aa9a9", "thesis": THESIS}
+DETECTOR_COLOURS = {"ours+corners": "#e8a87c", "ours": OURS, "harris": "#3f8fd6", "gftt": "#35a06b", "fast": "#b8a11e",
+                    "orb": "#c43d5b", "sift": "#4aa9a9", "thesis": THESIS}
 
 
 def path(points, colour, **more):
