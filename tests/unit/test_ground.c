@@ -81,6 +81,7 @@ static void check_tally(const tally_t *t, const char *what)
     TEST_ASSERT_MESSAGE(t->n_found >= 0.9 * t->n_true_ground, text);
     TEST_ASSERT_MESSAGE(t->n_high_lost <= 0.02 * t->n_high, text);
     TEST_ASSERT_MESSAGE(t->n_foot > 20 && t->n_foot_lost <= 0.1 * t->n_foot, text);
+    TEST_ASSERT_MESSAGE(t->n_high_lost + t->n_foot_lost <= 0.02 * (t->n_high + t->n_foot), text);
     TEST_ASSERT_MESSAGE(t->n_high_obstacle >= 0.5 * t->n_high, text);
 }
 

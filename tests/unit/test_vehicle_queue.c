@@ -121,6 +121,7 @@ static void the_tail_that_parts_do_not_hold_is_dropped_and_counted(void)
 {
     config.max_sent_junctions = OC_MAX_JUNCTIONS;
     config.judoca.max_junctions = OC_MAX_JUNCTIONS;
+    config.judoca.max_candidates = 8192;
     config.datagram_bytes = OC_MIN_DATAGRAM_BYTES;
     vehicle_start();
     /* Noise is full of junctions. */
@@ -132,7 +133,7 @@ static void the_tail_that_parts_do_not_hold_is_dropped_and_counted(void)
     frame.image.px = noise;
     oc_push_report_t report;
     TEST_ASSERT_EQUAL(OC_OK, oc_vehicle_push(vehicle, &frame, &report));
-    TEST_ASSERT_GREATER_THAN(500, report.n_found);
+    TEST_ASSERT_GREATER_THAN(600, report.n_found);
     uint8_t buf[OC_MAX_DATAGRAM_BYTES];
     oc_packet_head_t head;
     uint32_t n_junctions = 0, n_last = 0, n_parts = 0;
