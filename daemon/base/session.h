@@ -30,7 +30,7 @@ struct SessionOptions {
     double longest_wait_s = 2.0;       // or after so long while packets keep coming
     double longest_plan_wait_s = 10.0; // for a source to end before pixels are asked for
     double retry_s = 1.0;              // unanswered requests are repeated after this
-    int max_tries = 10;               // and given up after so many
+    int max_tries = 10;                // and given up after so many
     double settle_quiet_s = 3.0;       // an endless source settles after so long without news
 };
 

@@ -222,9 +222,8 @@ static uint32_t candidates_limit(const oc_judoca_ws_t *ws)
     return limit < OC_JUDOCA_MAX_FOUND ? limit : OC_JUDOCA_MAX_FOUND;
 }
 
-static places_choice_t places_choose(const oc_judoca_ws_t *ws, uint32_t n)
+static places_choice_t places_choose(const oc_judoca_ws_t *ws, uint32_t n, uint32_t limit)
 {
-    const uint32_t limit = candidates_limit(ws);
     uint32_t histogram[PRESCORE_BINS] = {0};
     for (uint32_t i = 0; i < n; i++) histogram[ws->search.place[i].prescore / (65536u / PRESCORE_BINS)]++;
     uint32_t bin = PRESCORE_BINS - 1u, sum = 0;
@@ -312,8 +311,8 @@ static void fit_places(oc_judoca_ws_t *ws)
     const oc_gradient_t *g = &ws->gradient;
     memset(ws->done, 0, oc_bitmap_words(g->width_px, g->height_px) * sizeof ws->done[0]);
     const uint32_t n = ws->search.n_places < ws->search.max_places ? ws->search.n_places : ws->search.max_places;
-    places_choice_t choice = places_choose(ws, n);
     const uint32_t limit = candidates_limit(ws);
+    places_choice_t choice = places_choose(ws, n, limit);
     for (uint32_t i = 0; i < n && ws->stats.n_fitted < limit; i++) {
         if (!places_take(&choice, &ws->search.place[i])) continue;
         ws->stats.n_fitted++;

@@ -22,10 +22,11 @@ extern "C" {
 /* Largest branch length. */
 #define OC_JUDOCA_MAX_LAMBDA_PX 24
 
-/* Places fitted per image at most. */
+/* Places fitted per image: what the parameter may say, and when it says
+ * nothing, the least and one more per so many pixels. */
 #define OC_JUDOCA_MAX_CANDIDATES 262144u
-#define OC_JUDOCA_PX_PER_CANDIDATE 144u
 #define OC_JUDOCA_LEAST_CANDIDATES 512u
+#define OC_JUDOCA_PX_PER_CANDIDATE 144u
 
 /* Fits kept per image before the nearest duplicates are dropped; 96 bytes each. */
 #define OC_JUDOCA_MAX_FOUND 8192u
@@ -56,7 +57,8 @@ typedef struct oc_judoca_params {
                               * max_junctions and min_distance_px with these by score. 0 = none; 0 */
     uint32_t max_candidates; /* places fitted per image, those of best pre-score, shared over the image,
                               * 16..OC_JUDOCA_MAX_CANDIDATES; 0 = OC_JUDOCA_LEAST_CANDIDATES and one per
-                              * pixels. Bounds the time; 0 */
+                              * OC_JUDOCA_PX_PER_CANDIDATE pixels. Never more than OC_JUDOCA_MAX_FOUND.
+                              * Bounds the time; 0 */
     uint32_t spread_cell_px; /* side of the cells that share max_junctions when it
                               * binds, 8..4096; 40 */
     oc_judoca_method_t method;
