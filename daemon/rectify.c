@@ -17,8 +17,7 @@ struct oc_rectify {
     rectify_cell_t *table;
     uint8_t *px;
     bool has_table;
-    oc_intrinsics_t k;
-    oc_distortion_t distortion;
+    oc_lens_t lens;
 };
 
 oc_rectify_t *oc_rectify_create(uint32_t max_width_px, uint32_t max_height_px)
@@ -43,12 +42,13 @@ void oc_rectify_destroy(oc_rectify_t *rectify)
     free(rectify);
 }
 
-static rectify_cell_t rectify_cell(const oc_intrinsics_t *k, const oc_distortion_t *distortion, uint32_t x, uint32_t y)
+static rectify_cell_t rectify_cell(const oc_lens_t *lens, uint32_t x, uint32_t y)
 {
     double raw_x, raw_y;
-    oc_distort(k, distortion, x, y, &raw_x, &raw_y);
+    oc_lens_distort(lens, x, y, &raw_x, &raw_y);
     rectify_cell_t cell = {-1, -1, 0, 0};
-    if (!(raw_x >= 0 && raw_y >= 0 && raw_x < k->width_px - 1.0 && raw_y < k->height_px - 1.0)) return cell;
+    if (!(raw_x >= 0 && raw_y >= 0 && raw_x < lens->raw.width_px - 1.0 && raw_y < lens->raw.height_px - 1.0))
+        return cell;
     cell.x = (int32_t)raw_x;
     cell.y = (int32_t)raw_y;
     cell.wx = (uint16_t)lround((raw_x - cell.x) * 256);
@@ -56,18 +56,18 @@ static rectify_cell_t rectify_cell(const oc_intrinsics_t *k, const oc_distortion
     return cell;
 }
 
-static void rectify_make_table(oc_rectify_t *rectify, const oc_intrinsics_t *k, const oc_distortion_t *distortion)
+static void rectify_make_table(oc_rectify_t *rectify, const oc_lens_t *lens)
 {
+    const oc_intrinsics_t *k = &lens->rectified;
     for (uint32_t y = 0; y < k->height_px; y++) {
         for (uint32_t x = 0; x < k->width_px; x++)
-            rectify->table[(size_t)y * k->width_px + x] = rectify_cell(k, distortion, x, y);
+            rectify->table[(size_t)y * k->width_px + x] = rectify_cell(lens, x, y);
     }
-    rectify->k = *k;
-    rectify->distortion = *distortion;
+    rectify->lens = *lens;
     rectify->has_table = true;
 }
 
-static void rectify_gather(const oc_image_t *raw, rectify_cell_t cell, uint8_t out[3])
+static void rectify_gather(const oc_raw_image_t *raw, rectify_cell_t cell, uint8_t out[3])
 {
     if (cell.x < 0) {
         memset(out, 0, 3);
@@ -82,12 +82,12 @@ static void rectify_gather(const oc_image_t *raw, rectify_cell_t cell, uint8_t o
     }
 }
 
-oc_image_t oc_rectify_apply(oc_rectify_t *rectify, const oc_image_t *raw, const oc_intrinsics_t *k,
-                            const oc_distortion_t *distortion)
+oc_image_t oc_rectify_apply(oc_rectify_t *rectify, const oc_raw_image_t *raw, const oc_lens_t *lens)
 {
-    const bool is_same = rectify->has_table && memcmp(&rectify->k, k, sizeof *k) == 0 &&
-                         memcmp(&rectify->distortion, distortion, sizeof *distortion) == 0;
-    if (!is_same) rectify_make_table(rectify, k, distortion);
+    if (oc_lens_is_identity(lens)) return oc_image_from_raw(raw);
+    const bool is_same = rectify->has_table && memcmp(&rectify->lens, lens, sizeof *lens) == 0;
+    if (!is_same) rectify_make_table(rectify, lens);
+    const oc_intrinsics_t *k = &lens->rectified;
     const size_t n = (size_t)k->width_px * k->height_px;
     for (size_t i = 0; i < n; i++) rectify_gather(raw, rectify->table[i], rectify->px + 3 * i);
     return (oc_image_t){rectify->px, k->width_px, k->height_px, 3 * k->width_px, 3};

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause
- * Lens distortion removed by a fixed look-up table. */
+ * From raw pixels to a rectified grey or RGB picture in one pass: lens
+ * distortion removed by a fixed look-up table, colours converted on the way,
+ * nothing copied before. */
 #ifndef OUTCROP_DAEMON_RECTIFY_H
 #define OUTCROP_DAEMON_RECTIFY_H
 
@@ -8,6 +10,8 @@
 
 #include "core/camera.h"
 #include "core/image.h"
+#include "lens.h"
+#include "pixel_format.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -15,16 +19,18 @@ extern "C" {
 
 typedef struct oc_rectify oc_rectify_t;
 
-/* A rectifier for RGB images of at most this size: 15 bytes a pixel, all
- * allocated here. NULL when there is no memory. */
+/* A rectifier whose pictures are at most this size: 15 bytes a pixel, all
+ * allocated here. NULL when there is no memory. One per camera. */
 oc_rectify_t *oc_rectify_create(uint32_t max_width_px, uint32_t max_height_px);
 void oc_rectify_destroy(oc_rectify_t *rectify);
 
-/* The pinhole image of a distorted one, same intrinsics, bilinear; pixels that
- * the raw image does not show become black. The table is made anew only when
- * camera or distortion change. The result is borrowed until the next call. */
-oc_image_t oc_rectify_apply(oc_rectify_t *rectify, const oc_image_t *raw, const oc_intrinsics_t *k,
-                            const oc_distortion_t *distortion);
+/* The pinhole picture of a raw one, lens->rectified, bilinear; pixels that the
+ * raw picture does not show become black. The table is made anew only when the
+ * lens changes (some 0.1 us a pixel); without distortion none is used. Grey raw
+ * pixels give 1 channel, others 3. The result is borrowed until the next call,
+ * and until the raw picture goes: grey or RGB without distortion is passed
+ * through. The raw picture's size must be lens->raw's. */
+oc_image_t oc_rectify_apply(oc_rectify_t *rectify, const oc_raw_image_t *raw, const oc_lens_t *lens);
 
 #ifdef __cplusplus
 }

@@ -76,8 +76,10 @@ void NullRival::decode(Keyframe *keyframe)
     if (!keyframe->head.has_distortion) return;
     const std::unique_ptr<oc_rectify_t, RectifyDelete> rectify(oc_rectify_create(k.width_px, k.height_px));
     if (!rectify) throw std::bad_alloc();
-    const oc_image_t raw = image_of(keyframe->rgb);
-    const oc_image_t flat = oc_rectify_apply(rectify.get(), &raw, &k, &keyframe->head.distortion);
+    const oc_image_t image = image_of(keyframe->rgb);
+    const oc_raw_image_t raw = oc_raw_from_image(&image);
+    const oc_lens_t lens = oc_lens_plumb_bob(&k, &keyframe->head.distortion);
+    const oc_image_t flat = oc_rectify_apply(rectify.get(), &raw, &lens);
     cv::Mat3b copy(bgr.rows, bgr.cols);
     std::memcpy(copy.data, flat.px, copy.total() * 3);
     keyframe->rgb = copy;

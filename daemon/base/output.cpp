@@ -63,10 +63,8 @@ json counts_of(Session &session, const ReceiveCounts &received)
     out["log_garbage_bytes"] = received.garbage_bytes;
     out["log_is_cut"] = received.is_log_cut;
     if (const auto &status = session.assembler().status()) {
-        static const char *const names[OC_N_COUNTERS] = {
-            "frames_in",        "frames_no_pose", "frames_not_key", "views_sent",    "views_dropped",
-            "junctions_capped", "requests_bad",   "requests_gone",  "requests_full", "send_failed"};
-        for (int i = 0; i < OC_N_COUNTERS; i++) out["vehicle"][names[i]] = status->counters[i];
+        for (int i = 0; i < OC_N_COUNTERS; i++)
+            out["vehicle"][oc_counter_name(static_cast<oc_counter_t>(i))] = status->counters[i];
     }
     return out;
 }

@@ -33,7 +33,9 @@ typedef struct site_capture {
     oc_capture_t base;
     site_view_t *views;
     uint32_t n_views, next_view;
-    uint8_t *px; /* one frame, RGB */
+    oc_site_option_t option;
+    int64_t next_ns; /* monotonic, when the next frame is due; 0 = at once */
+    uint8_t *px;     /* one frame, RGB */
 } site_capture_t;
 
 /* Where a complaint goes, and what it is about. */
@@ -169,6 +171,8 @@ static bool read_view(const site_reader_t *r, const char *folder, const json_t *
     frame->view_id = (uint16_t)(id ? json_integer_value(id) : (json_int_t)index);
     frame->has_view_id = true;
     frame->is_forced = true;
+    frame->lens = frame->has_distortion ? oc_lens_plumb_bob(&frame->camera.k, &frame->distortion)
+                                        : oc_lens_pinhole(&frame->camera.k);
 
     out->image_path = join_path(folder, json_string_value(image));
     if (!out->image_path) return complain(r, "out of memory");
@@ -318,16 +322,30 @@ static bool read_pictures(const site_reader_t *r, site_capture_t *site)
     return true;
 }
 
-static oc_capture_result_t site_next(oc_capture_t *self, oc_captured_t *frame, char *error, size_t error_bytes)
+static oc_capture_result_t site_next(oc_capture_t *self, int64_t now_ns, oc_captured_t *frame, char *error,
+                                     size_t error_bytes)
 {
     site_capture_t *site = (site_capture_t *)self;
     if (site->next_view == site->n_views) return OC_CAPTURE_DONE;
+    if (now_ns < site->next_ns) return OC_CAPTURE_NONE;
+    if (site->next_ns == 0) site->next_ns = now_ns;
+    site->next_ns += (int64_t)site->option.period_ms * 1000000;
     const site_view_t *view = &site->views[site->next_view++];
     oc_image_mut_t out = site_pixels(site, view);
     if (!oc_image_file_read(view->image_path, &out, error, error_bytes)) return OC_CAPTURE_ERROR;
     *frame = view->frame;
-    frame->image = (oc_image_t){out.px, out.width_px, out.height_px, out.stride_bytes, out.channels};
+    const oc_image_t image = {out.px, out.width_px, out.height_px, out.stride_bytes, out.channels};
+    frame->raw = oc_raw_from_image(&image);
+    frame->arrived_ns = now_ns;
     return OC_CAPTURE_FRAME;
+}
+
+static uint32_t site_wait(oc_capture_t *self, struct pollfd *fds, int64_t *wake_ns)
+{
+    (void)fds;
+    const site_capture_t *site = (const site_capture_t *)self;
+    *wake_ns = site->next_ns;
+    return 0;
 }
 
 static void site_close(oc_capture_t *self)
@@ -358,8 +376,8 @@ static json_t *load_cameras(const char *file, char *error, size_t error_bytes)
     return NULL;
 }
 
-oc_capture_t *oc_capture_open_site(const char *path, const oc_margin_option_t *margin, oc_margin_t *margin_used,
-                                   char *error, size_t error_bytes)
+oc_capture_t *oc_capture_open_site(const char *path, const oc_site_option_t *option, const oc_margin_option_t *margin,
+                                   oc_margin_t *margin_used, char *error, size_t error_bytes)
 {
     char *file = cameras_path(path), *folder = file ? strdup(file) : NULL;
     site_capture_t *site = calloc(1, sizeof *site);
@@ -379,7 +397,9 @@ oc_capture_t *oc_capture_open_site(const char *path, const oc_margin_option_t *m
     oc_margin_t used;
     is_ok = read_site(&reader, folder, root, margin, site, &used) && read_pictures(&reader, site);
     if (is_ok) *margin_used = used;
+    site->option = *option;
     site->base.next = site_next;
+    site->base.wait = site_wait;
     site->base.close = site_close;
 
 done:

@@ -168,7 +168,7 @@ static void take_file(config_reader_t *r, const yaml_file_t *file, oc_config_t *
         pick_uint(r, "stored_views", file->stored_views, 2, 256, config->vehicle.stored_views);
     take_link(r, file->link, config);
     snprintf(config->site, sizeof config->site, "%s", file->source->site);
-    config->period_ms = pick_uint(r, "source.period_ms", file->source->period_ms, 0, 3600000, 1000);
+    config->site_option.period_ms = pick_uint(r, "source.period_ms", file->source->period_ms, 0, 3600000, 1000);
     const yaml_margins_t none = {NULL, NULL}, *margins = file->margins ? file->margins : &none;
     config->margin.position_m = pick_float(r, "margins.position_m", margins->position_m, 0, 1e4, (double)NAN);
     const double angle_deg = pick_float(r, "margins.angle_deg", margins->angle_deg, 0, 45, (double)NAN);
@@ -177,15 +177,22 @@ static void take_file(config_reader_t *r, const yaml_file_t *file, oc_config_t *
     snprintf(config->debug_dump, sizeof config->debug_dump, "%s", file->debug_dump ? file->debug_dump : "");
 }
 
-bool oc_config_load(const char *path, oc_config_t *config, char *error, size_t error_bytes)
+bool oc_config_load(const char *path, oc_config_t *config, oc_config_fault_t on_fault, void *user)
 {
     void *data = NULL;
-    if (!oc_yaml_load(path, &file_schema, &data, error, error_bytes)) return false;
+    char error[1024];
+    if (!oc_yaml_load(path, &file_schema, &data, error, sizeof error)) {
+        on_fault(user, error);
+        return false;
+    }
     oc_config_t fresh = {.vehicle = oc_vehicle_defaults()};
-    config_reader_t reader = {path, error, error_bytes, false};
+    config_reader_t reader = {path, error, sizeof error, false};
     take_file(&reader, data, &fresh);
     oc_yaml_free(&file_schema, data);
-    if (reader.is_bad) return false;
+    if (reader.is_bad) {
+        on_fault(user, error);
+        return false;
+    }
     *config = fresh;
     return true;
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause
  * outcropd's configuration file (YAML, checked against a schema). Every key
- * with unit, range and default: docs/operating.md. */
+ * with unit, range and default: docs/outcropd.yaml. */
 #ifndef OUTCROP_DAEMON_CONFIG_H
 #define OUTCROP_DAEMON_CONFIG_H
 
@@ -8,13 +8,19 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "camera_source.h"
 #include "capture.h"
+#include "gpio.h"
+#include "pose_lcm.h"
 #include "vehicle/vehicle.h"
 
 #define OC_CONFIG_TEXT_BYTES 512
 
 /* What crosses the link: layers on request, or every keyframe whole (the null rival). */
 typedef enum oc_link_mode { OC_LINK_LAYERS, OC_LINK_IMAGES } oc_link_mode_t;
+
+/* Where frames come from. */
+typedef enum oc_source { OC_SOURCE_SITE, OC_SOURCE_CAMERAS } oc_source_t;
 
 typedef struct oc_config {
     char down_url[OC_CONFIG_TEXT_BYTES]; /* LCM group that carries vehicle to base */
@@ -24,16 +30,31 @@ typedef struct oc_config {
     oc_codec_t image_codec;
     int image_quality;
 
+    oc_source_t source;
     char site[OC_CONFIG_TEXT_BYTES]; /* folder or cameras file */
-    uint32_t period_ms;              /* between two frames of a site folder */
+    oc_site_option_t site_option;
     oc_margin_option_t margin;
-    char debug_dump[OC_CONFIG_TEXT_BYTES]; /* folder for junctions.json, "" = none */
 
-    oc_vehicle_config_t vehicle; /* image size and area are filled from the source */
+    oc_camera_source_config_t cameras; /* lenses already read from their calibration files */
+    char pose_url[OC_CONFIG_TEXT_BYTES];
+    char pose_channel[64];
+    oc_pose_type_t pose_type;
+    uint32_t pose_max_gap_ms; /* poses farther apart do not bracket a frame */
+
+    oc_gpio_config_t gpio;
+
+    uint32_t pre_event_s;                   /* how far back a mark or a request reaches */
+    char status_file[OC_CONFIG_TEXT_BYTES]; /* rewritten every second, for --status; "" = none */
+    char debug_dump[OC_CONFIG_TEXT_BYTES];  /* folder for junctions.json, "" = none */
+
+    oc_vehicle_config_t vehicle; /* image size and area are filled from the source; hold_views from pre_event */
 } oc_config_t;
 
-/* Read and check a file. False, and one line in error that names file, line
- * and key, when it is unreadable, has an unknown key or a value out of range. */
-bool oc_config_load(const char *path, oc_config_t *config, char *error, size_t error_bytes);
+/* One fault of a configuration file: "FILE:LINE: key: what is wrong". */
+typedef void (*oc_config_fault_t)(void *user, const char *line);
+
+/* Read and check a file and the calibration files it names. Every fault goes to `on_fault`, in the order of
+ * lines; false when there was any, and config is then untouched. */
+bool oc_config_load(const char *path, oc_config_t *config, oc_config_fault_t on_fault, void *user);
 
 #endif

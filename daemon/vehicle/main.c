@@ -22,16 +22,20 @@ static void print_help(void)
          "Exit status: 0 ended by a signal or checked well, 1 failed, 2 wrong usage.");
 }
 
+static void print_fault(void *user, const char *line)
+{
+    (void)user;
+    fprintf(stderr, "outcropd: %s\n", line);
+}
+
 static int serve(const char *path, bool is_check)
 {
     static oc_config_t config;
     char error[1024];
-    if (!oc_config_load(path, &config, error, sizeof error)) {
-        fprintf(stderr, "outcropd: %s\n", error);
-        return 1;
-    }
+    if (!oc_config_load(path, &config, print_fault, NULL)) return 1;
     oc_margin_t margin;
-    oc_capture_t *capture = oc_capture_open_site(config.site, &config.margin, &margin, error, sizeof error);
+    oc_capture_t *capture =
+        oc_capture_open_site(config.site, &config.site_option, &config.margin, &margin, error, sizeof error);
     if (!capture) {
         fprintf(stderr, "outcropd: %s\n", error);
         return 1;

@@ -109,7 +109,8 @@ static void run_push_image(vehicle_run_t *run, const oc_captured_t *captured)
                                  .margin = captured->margin,
                                  .has_distortion = captured->has_distortion,
                                  .distortion = captured->distortion};
-    if (!oc_image_sender_push(run->images, &head, &captured->image)) {
+    const oc_image_t image = oc_image_from_raw(&captured->raw);
+    if (!oc_image_sender_push(run->images, &head, &image)) {
         /* A rival that leaves views out is no rival: say so and end. */
         snprintf(run->fault, sizeof run->fault,
                  "view %u: cannot be sent whole: the codec failed, or it takes more than 256 datagrams", head.view);
@@ -122,7 +123,7 @@ static void run_push_image(vehicle_run_t *run, const oc_captured_t *captured)
 
 static void run_push_frame(vehicle_run_t *run, const oc_captured_t *captured)
 {
-    oc_frame_t frame = {.image = captured->image,
+    oc_frame_t frame = {.image = oc_rectify_apply(run->rectify, &captured->raw, &captured->lens),
                         .camera = captured->camera,
                         .margin = captured->margin,
                         .has_distortion = captured->has_distortion,
@@ -132,8 +133,6 @@ static void run_push_frame(vehicle_run_t *run, const oc_captured_t *captured)
                         .has_view_id = captured->has_view_id,
                         .view_id = captured->view_id,
                         .is_forced = captured->is_forced};
-    if (captured->has_distortion)
-        frame.image = oc_rectify_apply(run->rectify, &captured->image, &captured->camera.k, &captured->distortion);
     oc_push_report_t report;
     const int64_t begin_ns = now_ns();
     const oc_status_t status = oc_vehicle_push(run->vehicle, &frame, &report);
@@ -152,7 +151,8 @@ static void run_take_frame(vehicle_run_t *run)
 {
     oc_captured_t captured;
     char error[512];
-    const oc_capture_result_t result = run->capture->next(run->capture, &captured, error, sizeof error);
+    const oc_capture_result_t result = run->capture->next(run->capture, now_ns(), &captured, error, sizeof error);
+    if (result == OC_CAPTURE_NONE) return;
     if (result == OC_CAPTURE_ERROR) {
         fprintf(stderr, "outcropd: %s\n", error);
         return;
@@ -308,7 +308,7 @@ static void run_loop(vehicle_run_t *run)
         }
         if (!run->is_source_done && now >= run->next_frame_ns) {
             run_take_frame(run);
-            run->next_frame_ns += (int64_t)run->config->period_ms * 1000000LL;
+            if (!run->is_source_done) run->capture->wait(run->capture, NULL, &run->next_frame_ns);
             now = now_ns();
         }
         bool has_more = now < run->next_send_ns;

@@ -58,7 +58,8 @@ typedef enum oc_packet_type {
     OC_PACKET_PATCH_REQUEST = 17,
     OC_PACKET_OVERHEAD_REQUEST = 18,
     OC_PACKET_SILHOUETTE_REQUEST = 19, /* kept; refused in version 0 */
-    OC_PACKET_TEXTURE_REQUEST = 20     /* kept; refused in version 0 */
+    OC_PACKET_TEXTURE_REQUEST = 20,    /* kept; refused in version 0 */
+    OC_PACKET_RECALL_REQUEST = 21      /* send what was held back, or once more, of a stretch of time */
 } oc_packet_type_t;
 
 typedef struct oc_packet_head {
@@ -175,20 +176,56 @@ typedef struct oc_resend_request {
     uint32_t parts;
 } oc_resend_request_t;
 
-/* Counters of things that were dropped on the way, in the order of docs/operating.md. */
+/* Ask for the views of a stretch of time, whether they were held back or have
+ * been sent: from utime from_us to to_us, or the last last_ms before the request arrives. */
+typedef struct oc_recall_request {
+    bool is_relative;
+    int64_t from_us, to_us; /* absolute; from <= to */
+    uint32_t last_ms;       /* relative */
+} oc_recall_request_t;
+
+/* Counters of what came, what was dropped and why, in the order of docs/operating.md. */
 typedef enum oc_counter {
-    OC_COUNT_FRAMES_IN,
-    OC_COUNT_FRAMES_NO_POSE,
-    OC_COUNT_FRAMES_NOT_KEY,
-    OC_COUNT_VIEWS_SENT,
-    OC_COUNT_VIEWS_DROPPED,
-    OC_COUNT_JUNCTIONS_CAPPED,
-    OC_COUNT_REQUESTS_BAD,
-    OC_COUNT_REQUESTS_GONE,
-    OC_COUNT_REQUESTS_FULL,
-    OC_COUNT_SEND_FAILED,
+    OC_COUNT_FRAMES_IN,        /* handed to the vehicle */
+    OC_COUNT_FRAMES_NO_POSE,   /* no poses around the frame's time */
+    OC_COUNT_FRAMES_NOT_KEY,   /* passed over by the keyframe policy */
+    OC_COUNT_VIEWS_SENT,       /* left whole */
+    OC_COUNT_VIEWS_DROPPED,    /* left the ring unsent */
+    OC_COUNT_JUNCTIONS_CAPPED, /* over a limit */
+    OC_COUNT_REQUESTS_BAD,     /* ill-formed or impossible */
+    OC_COUNT_REQUESTS_GONE,    /* for what has left the ring */
+    OC_COUNT_REQUESTS_FULL,    /* no room to queue them */
+    OC_COUNT_SEND_FAILED,      /* packets that the transport refused */
+    OC_COUNT_FRAMES_FLAGGED,   /* the driver says that the buffer is damaged */
+    OC_COUNT_FRAMES_CORRUPT,   /* short, or a JPEG that does not decode */
+    OC_COUNT_FRAMES_LOST,      /* gaps in the driver's sequence */
+    OC_COUNT_FRAMES_OVERRUN,   /* waited for a pose until newer ones needed the buffer */
+    OC_COUNT_FRAMES_DISABLED,  /* the capture-enable input was off */
+    OC_COUNT_FRAMES_BAD_TIME,  /* not later than the one before, or in the future */
+    OC_COUNT_FRAMES_REFUSED,   /* size, pose or margin that the vehicle cannot take */
+    OC_COUNT_CAMERA_LOST,      /* unplugged, or failed while streaming */
+    OC_COUNT_CAMERA_STALLS,    /* sent nothing for too long */
+    OC_COUNT_CAMERA_FAULTS,    /* could not be opened or set up, once per spell */
+    OC_COUNT_CAMERA_OPENED,    /* started to stream; the first time as well */
+    OC_COUNT_CONTROLS_REFUSED, /* exposure, gain or white balance not set */
+    OC_COUNT_POSES_IN,
+    OC_COUNT_POSES_BAD,       /* ill-formed */
+    OC_COUNT_POSES_LATE,      /* not newer than the last */
+    OC_COUNT_CLOCK_STEPS,     /* UTC jumped */
+    OC_COUNT_MARKS,           /* mark inputs taken */
+    OC_COUNT_MARKS_DROPPED,   /* came faster than they were taken */
+    OC_COUNT_GPIO_FAULTS,     /* a line could not be set or read */
+    OC_COUNT_PULSES_MISSED,   /* trigger pulses that were too late to give */
+    OC_COUNT_PACKETS_BAD,     /* received, no packet of ours */
+    OC_COUNT_PACKETS_FOREIGN, /* received, for another vehicle */
+    OC_COUNT_PACKETS_FULL,    /* received, no room to queue them */
+    OC_COUNT_TILES_DROPPED,   /* ground tiles that could not be encoded or queued */
+    OC_COUNT_RECALLED,        /* held views that a mark or a request set free */
     OC_N_COUNTERS
 } oc_counter_t;
+
+/* Snake case, "frames_in"; static storage. */
+const char *oc_counter_name(oc_counter_t counter);
 
 /* Where the operator works, metres. Junctions that cannot lie in it stay off the link. */
 typedef struct oc_area {
@@ -198,12 +235,12 @@ typedef struct oc_area {
 
 typedef struct oc_vehicle_status {
     uint32_t uptime_s;
-    uint16_t n_views;                 /* views and announcements given out so far */
-    uint16_t newest_view;             /* valid when n_views > 0 */
-    bool is_source_done;              /* a site folder has been played to its end */
-    uint32_t bytes_sent;              /* packets, without LCM's overhead */
-    oc_area_t area;                   /* float32 on the wire; the base falls back on it */
-    uint32_t counters[OC_N_COUNTERS]; /* saturate at 65535 on the wire */
+    uint16_t n_views;     /* views and announcements given out so far */
+    uint16_t newest_view; /* valid when n_views > 0 */
+    bool is_source_done;  /* a site folder has been played to its end */
+    uint32_t bytes_sent;  /* packets, without LCM's overhead */
+    oc_area_t area;       /* float32 on the wire; the base falls back on it */
+    uint32_t counters[OC_N_COUNTERS];
 } oc_vehicle_status_t;
 
 /* ---- encoding: vehicle ----

@@ -2,8 +2,6 @@
  * Small packets of the vehicle: relabel, announce, status. */
 #include "core/packet_internal.h"
 
-#define COUNTER_MAX 65535u
-
 /* ---- relabel ---- */
 
 static uint8_t most_common_label(const uint8_t labels[], uint16_t n)
@@ -95,6 +93,37 @@ oc_status_t oc_packet_decode_announce(const uint8_t *buf, size_t n_bytes, oc_ann
 
 /* ---- status ---- */
 
+const char *oc_counter_name(oc_counter_t counter)
+{
+    static const char *const names[OC_N_COUNTERS] = {
+        "frames_in",     "frames_no_pose",  "frames_not_key",  "views_sent",       "views_dropped",  "junctions_capped",
+        "requests_bad",  "requests_gone",   "requests_full",   "send_failed",      "frames_flagged", "frames_corrupt",
+        "frames_lost",   "frames_overrun",  "frames_disabled", "frames_bad_time",  "frames_refused", "camera_lost",
+        "camera_stalls", "camera_faults",   "camera_opened",   "controls_refused", "poses_in",       "poses_bad",
+        "poses_late",    "clock_steps",     "marks",           "marks_dropped",    "gpio_faults",    "pulses_missed",
+        "packets_bad",   "packets_foreign", "packets_full",    "tiles_dropped",    "recalled",
+    };
+    return (unsigned)counter < OC_N_COUNTERS ? names[counter] : "?";
+}
+
+/* 1 bit for 0; else the number of significant bits less one in 5, and all but the highest of them. */
+static void counter_put(oc_bit_writer_t *writer, uint32_t count)
+{
+    oc_bits_put(writer, count > 0 ? 1 : 0, 1);
+    if (count == 0) return;
+    unsigned n = 0;
+    while (count >> n > 1) n++;
+    oc_bits_put(writer, n, 5);
+    oc_bits_put(writer, count - (1u << n), n);
+}
+
+static uint32_t counter_get(oc_bit_reader_t *reader)
+{
+    if (oc_bits_get(reader, 1) == 0) return 0;
+    const unsigned n = (unsigned)oc_bits_get(reader, 5);
+    return (1u << n) | (uint32_t)oc_bits_get(reader, n);
+}
+
 static bool area_is_sendable(const oc_area_t *area)
 {
     const double v[5] = {area->x_min, area->x_max, area->y_min, area->y_max, area->z_max};
@@ -143,8 +172,7 @@ oc_status_t oc_packet_encode_status(const oc_packet_head_t *packet, const oc_veh
     oc_bits_put(&writer, status->newest_view, 16);
     oc_bits_put(&writer, status->bytes_sent, 32);
     for (int i = 0; i < OC_N_COUNTERS; i++) {
-        const uint32_t count = status->counters[i];
-        oc_bits_put(&writer, count > COUNTER_MAX ? COUNTER_MAX : count, 16);
+        counter_put(&writer, status->counters[i]);
     }
     oc_bits_put(&writer, status->is_source_done ? 1 : 0, 1);
     area_put(&writer, &status->area);
@@ -163,7 +191,7 @@ oc_status_t oc_packet_decode_status(const uint8_t *buf, size_t n_bytes, oc_vehic
     result.newest_view = (uint16_t)oc_bits_get(&reader, 16);
     result.bytes_sent = oc_bits_get(&reader, 32);
     for (int i = 0; i < OC_N_COUNTERS; i++) {
-        result.counters[i] = oc_bits_get(&reader, 16);
+        result.counters[i] = counter_get(&reader);
     }
     result.is_source_done = oc_bits_get(&reader, 1) == 1;
     if (area_get(&reader, &result.area) != OC_OK) return OC_E_FORMAT;

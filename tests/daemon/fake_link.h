@@ -84,9 +84,10 @@ public:
     {
         char error[512];
         const oc_margin_option_t none{NAN, NAN};
+        const oc_site_option_t at_once{};
         oc_margin_t margin;
-        capture_.reset(
-            oc_capture_open_site((OUTCROP_TEST_DATA "/sites/" + site).c_str(), &none, &margin, error, sizeof error));
+        capture_.reset(oc_capture_open_site((OUTCROP_TEST_DATA "/sites/" + site).c_str(), &at_once, &none, &margin,
+                                            error, sizeof error));
         if (!capture_) throw std::runtime_error(error);
         oc_vehicle_config_t config = oc_vehicle_defaults();
         config.vehicle = kId;
@@ -116,7 +117,7 @@ public:
         char error[512];
         oc_captured_t captured;
         for (;;) {
-            const oc_capture_result_t result = capture_->next(capture_.get(), &captured, error, sizeof error);
+            const oc_capture_result_t result = capture_->next(capture_.get(), 1, &captured, error, sizeof error);
             if (result == OC_CAPTURE_ERROR) throw std::runtime_error(error);
             is_done_ = result == OC_CAPTURE_DONE;
             if (is_done_) return;
@@ -195,7 +196,7 @@ private:
     void push_frame(const oc_captured_t &captured)
     {
         oc_frame_t frame{};
-        frame.image = captured.image;
+        frame.image = oc_image_from_raw(&captured.raw);
         frame.camera = captured.camera;
         frame.margin = captured.margin;
         frame.utime_us = captured.utime_us;
@@ -213,8 +214,8 @@ private:
         head.utime_us = captured.utime_us;
         head.camera = captured.camera;
         head.margin = captured.margin;
-        if (!oc_image_sender_push(images_.get(), &head, &captured.image))
-            throw std::runtime_error("an image was refused");
+        const oc_image_t image = oc_image_from_raw(&captured.raw);
+        if (!oc_image_sender_push(images_.get(), &head, &image)) throw std::runtime_error("an image was refused");
     }
 
     Packet next_tile()

@@ -34,12 +34,14 @@ void tearDown(void)
     site_maker_remove(folder);
 }
 
+static const oc_site_option_t at_once;
+
 static oc_capture_t *open_site(const oc_margin_option_t *option)
 {
     site_maker_write(folder, site);
     error[0] = '\0';
     memset(&margin, 0, sizeof margin);
-    return oc_capture_open_site(folder, option, &margin, error, sizeof error);
+    return oc_capture_open_site(folder, &at_once, option, &margin, error, sizeof error);
 }
 
 /* The site is refused with one line that names a file of the folder and holds `what`; nothing is put out. */
@@ -87,18 +89,18 @@ static void plays_its_views_in_order_with_their_numbers_and_times(void)
     const int ids[3] = {0, 1, 7};
     oc_captured_t frame;
     for (int i = 0; i < 3; i++) {
-        TEST_ASSERT_EQUAL(OC_CAPTURE_FRAME, capture->next(capture, &frame, error, sizeof error));
+        TEST_ASSERT_EQUAL(OC_CAPTURE_FRAME, capture->next(capture, 1, &frame, error, sizeof error));
         TEST_ASSERT_TRUE(frame.has_view_id && frame.is_forced);
         TEST_ASSERT_EQUAL(ids[i], frame.view_id);
-        TEST_ASSERT_EQUAL_UINT8(site_maker_pixel(i, 10, 20, 1), frame.image.px[20 * frame.image.stride_bytes + 31]);
+        TEST_ASSERT_EQUAL_UINT8(site_maker_pixel(i, 10, 20, 1), frame.raw.px[20 * frame.raw.stride_bytes + 31]);
         double centre[3];
         oc_pose_centre(&frame.camera.pose, centre);
         TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0 + i, centre[2]); /* millimetres in the file */
         if (i == 1) TEST_ASSERT_EQUAL_INT64(1500000000000000, frame.utime_us);
     }
     TEST_ASSERT_EQUAL_INT64(1072915200000000 + 2000000, frame.utime_us);
-    TEST_ASSERT_EQUAL(OC_CAPTURE_DONE, capture->next(capture, &frame, error, sizeof error));
-    TEST_ASSERT_EQUAL(OC_CAPTURE_DONE, capture->next(capture, &frame, error, sizeof error));
+    TEST_ASSERT_EQUAL(OC_CAPTURE_DONE, capture->next(capture, 1, &frame, error, sizeof error));
+    TEST_ASSERT_EQUAL(OC_CAPTURE_DONE, capture->next(capture, 1, &frame, error, sizeof error));
     capture->close(capture);
 }
 
@@ -122,7 +124,7 @@ static void margins_come_from_the_option_before_the_file_before_the_rule(void)
     capture = open_site(&option);
     TEST_ASSERT_NOT_NULL_MESSAGE(capture, error);
     oc_captured_t frame;
-    TEST_ASSERT_EQUAL(OC_CAPTURE_FRAME, capture->next(capture, &frame, error, sizeof error));
+    TEST_ASSERT_EQUAL(OC_CAPTURE_FRAME, capture->next(capture, 1, &frame, error, sizeof error));
     TEST_ASSERT_EQUAL_DOUBLE(0.2, frame.margin.v[1]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2 * 3.14159265358979 / 180, frame.margin.v[4]);
     capture->close(capture);
@@ -227,7 +229,8 @@ static void refuses_text_that_is_no_json(void)
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
         site_maker_text(folder, texts[i]);
         error[0] = '\0';
-        TEST_ASSERT_NULL_MESSAGE(oc_capture_open_site(folder, &no_option, &margin, error, sizeof error), texts[i]);
+        TEST_ASSERT_NULL_MESSAGE(oc_capture_open_site(folder, &at_once, &no_option, &margin, error, sizeof error),
+                                 texts[i]);
         TEST_ASSERT_EQUAL_MESSAGE(0, strncmp(error, folder, strlen(folder)), error);
         TEST_ASSERT_NULL_MESSAGE(strchr(error, '\n'), error);
         TEST_ASSERT_TRUE_MESSAGE(strlen(error) > strlen(folder) + 16, error);
@@ -255,9 +258,10 @@ static void refuses_bad_pictures(void)
 
 static void names_a_folder_that_is_not_there(void)
 {
-    TEST_ASSERT_NULL(oc_capture_open_site("/nowhere/at/all", &no_option, &margin, error, sizeof error));
+    TEST_ASSERT_NULL(oc_capture_open_site("/nowhere/at/all", &at_once, &no_option, &margin, error, sizeof error));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error, "/nowhere/at/all"), error);
-    TEST_ASSERT_NULL(oc_capture_open_site(folder, &no_option, &margin, error, sizeof error)); /* no cameras.json yet */
+    TEST_ASSERT_NULL(
+        oc_capture_open_site(folder, &at_once, &no_option, &margin, error, sizeof error)); /* no cameras.json yet */
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error, "cameras.json"), error);
 }
 

@@ -43,7 +43,7 @@ public:
 Frame copy_of(const oc_captured_t &captured)
 {
     if (captured.has_distortion) throw std::runtime_error("a site with lens distortion: not for this bench");
-    const oc_image_t &image = captured.image;
+    const oc_image_t image = oc_image_from_raw(&captured.raw);
     Frame out;
     out.px.assign(image.px, image.px + image.stride_bytes * image.height_px);
     out.frame = oc_frame_t{};
@@ -68,7 +68,9 @@ Scene load_scene(const ReportedSiteOptions &options)
     char error[512] = "";
     const oc_margin_option_t from_file = {NAN, NAN};
     oc_margin_t used;
-    oc_capture_t *capture = oc_capture_open_site(cameras.path.c_str(), &from_file, &used, error, sizeof error);
+    const oc_site_option_t at_once{};
+    oc_capture_t *capture =
+        oc_capture_open_site(cameras.path.c_str(), &at_once, &from_file, &used, error, sizeof error);
     if (!capture) throw std::runtime_error(error);
 
     Scene scene;
@@ -77,7 +79,7 @@ Scene load_scene(const ReportedSiteOptions &options)
     scene.area = capture->area;
     oc_captured_t captured;
     oc_capture_result_t got;
-    while ((got = capture->next(capture, &captured, error, sizeof error)) == OC_CAPTURE_FRAME)
+    while ((got = capture->next(capture, 1, &captured, error, sizeof error)) == OC_CAPTURE_FRAME)
         scene.frames.push_back(copy_of(captured));
     capture->close(capture);
     if (got == OC_CAPTURE_ERROR) throw std::runtime_error(error);
