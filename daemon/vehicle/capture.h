@@ -61,15 +61,18 @@ typedef struct oc_margin_option {
     double position_m, angle_rad;
 } oc_margin_option_t;
 
-/* How a site folder is played. */
+/* How a site folder is played. Zero: every view once, at once, each a keyframe. */
 typedef struct oc_site_option {
     uint32_t period_ms;       /* between two frames */
-    bool is_looped;           /* begin anew at the end, with times that go on; every picture is kept decoded */
-    bool has_keyframe_policy; /* false: every listed view becomes a keyframe */
+    uint32_t repeat;          /* frames of one view before the next, as of a vehicle that stands; 0 means 1 */
+    bool is_looped;           /* begin anew at the end; times go on, period_ms apart from the first view's */
+    bool has_keyframe_policy; /* false: every frame becomes a keyframe */
 } oc_site_option_t;
 
 /* A site folder, or its cameras file. Checks every view and decodes every
  * picture once before it returns (some 5 ms each at 640 x 480); NULL and one line in error otherwise.
+ * A picture that is shown again (looped, repeated) is kept decoded, 3 bytes a
+ * pixel: playing then reads no file and allocates nothing. More than 1 GiB of them are refused.
  * Margins: the option before the file before 0.5 % of the median distance from
  * camera to ground along the axis and 1 degree; `margin_used` says which. */
 oc_capture_t *oc_capture_open_site(const char *path, const oc_site_option_t *option, const oc_margin_option_t *margin,

@@ -24,18 +24,23 @@
 #define SITE_MAX_MARGIN_DEG 45.0
 #define SITE_MAX_UTIME_US (((int64_t)1 << 56) - 1)
 
+/* What decoded pictures may take. */
+#define SITE_MAX_KEPT_BYTES ((size_t)1 << 30)
+
 typedef struct site_view {
     char *image_path;
+    uint8_t *kept_px;    /* decoded, RGB; NULL when read anew each time */
     oc_captured_t frame; /* all but the pixels */
 } site_view_t;
 
 typedef struct site_capture {
     oc_capture_t base;
     site_view_t *views;
-    uint32_t n_views, next_view;
+    uint32_t n_views;
     oc_site_option_t option;
-    int64_t next_ns; /* monotonic, when the next frame is due; 0 = at once */
-    uint8_t *px;     /* one frame, RGB */
+    uint64_t n_shown; /* frames handed out */
+    int64_t next_ns;  /* monotonic, when the next frame is due; 0 = at once */
+    uint8_t *px;      /* one frame, RGB */
 } site_capture_t;
 
 /* Where a complaint goes, and what it is about. */
@@ -299,22 +304,46 @@ static bool read_site(site_reader_t *r, const char *folder, const json_t *root, 
         if (k->width_px > site->base.max_width_px) site->base.max_width_px = k->width_px;
         if (k->height_px > site->base.max_height_px) site->base.max_height_px = k->height_px;
     }
-    site->base.n_frames = site->n_views;
+    site->base.n_frames = site->option.is_looped ? 0 : site->n_views * site->option.repeat;
     if (!read_area(r, root, &site->base.area)) return false;
     return read_margins(r, root, option, site, used);
+}
+
+static bool site_keeps_pictures(const site_capture_t *site)
+{
+    return site->option.is_looped || site->option.repeat > 1;
 }
 
 static oc_image_mut_t site_pixels(const site_capture_t *site, const site_view_t *view)
 {
     const oc_intrinsics_t *k = &view->frame.camera.k;
-    return (oc_image_mut_t){site->px, k->width_px, k->height_px, 3 * k->width_px, 3};
+    return (oc_image_mut_t){view->kept_px ? view->kept_px : site->px, k->width_px, k->height_px, 3 * k->width_px, 3};
+}
+
+static bool keep_pictures(const site_reader_t *r, site_capture_t *site)
+{
+    size_t n_bytes = 0;
+    for (uint32_t i = 0; i < site->n_views; i++) {
+        const oc_intrinsics_t *k = &site->views[i].frame.camera.k;
+        n_bytes += (size_t)k->width_px * k->height_px * 3;
+        if (n_bytes > SITE_MAX_KEPT_BYTES)
+            return complain(r, "pictures shown again and again are kept decoded, and these take more than %zu MiB",
+                            SITE_MAX_KEPT_BYTES >> 20);
+        site->views[i].kept_px = malloc((size_t)k->width_px * k->height_px * 3);
+        if (!site->views[i].kept_px) return complain(r, "out of memory");
+    }
+    return true;
 }
 
 /* A broken picture is found before anything is sent, not in the middle of a drive. */
 static bool read_pictures(const site_reader_t *r, site_capture_t *site)
 {
-    site->px = malloc((size_t)site->base.max_width_px * site->base.max_height_px * 3);
-    if (!site->px) return complain(r, "out of memory");
+    if (site_keeps_pictures(site)) {
+        if (!keep_pictures(r, site)) return false;
+    } else {
+        site->px = malloc((size_t)site->base.max_width_px * site->base.max_height_px * 3);
+        if (!site->px) return complain(r, "out of memory");
+    }
     for (uint32_t i = 0; i < site->n_views; i++) {
         oc_image_mut_t out = site_pixels(site, &site->views[i]);
         if (!oc_image_file_read(site->views[i].image_path, &out, r->error, r->error_bytes)) return false;
@@ -322,21 +351,35 @@ static bool read_pictures(const site_reader_t *r, site_capture_t *site)
     return true;
 }
 
+/* What the n-th frame is, but for the pixels. */
+static void site_describe_frame(const site_capture_t *site, const site_view_t *view, oc_captured_t *frame)
+{
+    *frame = view->frame;
+    frame->is_forced = !site->option.has_keyframe_policy;
+    if (!site_keeps_pictures(site)) return;
+    /* Shown again, a view is another frame: the vehicle numbers it, and its time goes on. */
+    frame->has_view_id = false;
+    const int64_t step_us = site->option.period_ms > 0 ? (int64_t)site->option.period_ms * 1000 : 1000;
+    frame->utime_us = site->views[0].frame.utime_us + (int64_t)site->n_shown * step_us;
+}
+
 static oc_capture_result_t site_next(oc_capture_t *self, int64_t now_ns, oc_captured_t *frame, char *error,
                                      size_t error_bytes)
 {
     site_capture_t *site = (site_capture_t *)self;
-    if (site->next_view == site->n_views) return OC_CAPTURE_DONE;
+    const uint64_t index = site->n_shown / site->option.repeat;
+    if (index >= site->n_views && !site->option.is_looped) return OC_CAPTURE_DONE;
     if (now_ns < site->next_ns) return OC_CAPTURE_NONE;
-    if (site->next_ns == 0) site->next_ns = now_ns;
-    site->next_ns += (int64_t)site->option.period_ms * 1000000;
-    const site_view_t *view = &site->views[site->next_view++];
+    const int64_t due_ns = site->next_ns == 0 || site->option.period_ms == 0 ? now_ns : site->next_ns;
+    site->next_ns = due_ns + (int64_t)site->option.period_ms * 1000000;
+    const site_view_t *view = &site->views[index % site->n_views];
+    site_describe_frame(site, view, frame);
+    site->n_shown++;
     oc_image_mut_t out = site_pixels(site, view);
-    if (!oc_image_file_read(view->image_path, &out, error, error_bytes)) return OC_CAPTURE_ERROR;
-    *frame = view->frame;
+    if (!view->kept_px && !oc_image_file_read(view->image_path, &out, error, error_bytes)) return OC_CAPTURE_ERROR;
     const oc_image_t image = {out.px, out.width_px, out.height_px, out.stride_bytes, out.channels};
     frame->raw = oc_raw_from_image(&image);
-    frame->arrived_ns = now_ns;
+    frame->arrived_ns = due_ns;
     return OC_CAPTURE_FRAME;
 }
 
@@ -351,7 +394,10 @@ static uint32_t site_wait(oc_capture_t *self, struct pollfd *fds, int64_t *wake_
 static void site_close(oc_capture_t *self)
 {
     site_capture_t *site = (site_capture_t *)self;
-    for (uint32_t i = 0; i < site->n_views; i++) free(site->views[i].image_path);
+    for (uint32_t i = 0; i < site->n_views; i++) {
+        free(site->views[i].image_path);
+        free(site->views[i].kept_px);
+    }
     free(site->views);
     free(site->px);
     free(site);
@@ -393,11 +439,12 @@ oc_capture_t *oc_capture_open_site(const char *path, const oc_site_option_t *opt
 
     root = load_cameras(file, error, error_bytes);
     if (!root) goto done;
+    site->option = *option;
+    if (option->repeat == 0) site->option.repeat = 1;
     site_reader_t reader = {file, error, error_bytes, 1};
     oc_margin_t used;
     is_ok = read_site(&reader, folder, root, margin, site, &used) && read_pictures(&reader, site);
     if (is_ok) *margin_used = used;
-    site->option = *option;
     site->base.next = site_next;
     site->base.wait = site_wait;
     site->base.close = site_close;

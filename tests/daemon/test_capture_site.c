@@ -104,6 +104,34 @@ static void plays_its_views_in_order_with_their_numbers_and_times(void)
     capture->close(capture);
 }
 
+static void a_looped_site_goes_on_for_ever_with_times_that_go_on(void)
+{
+    site_maker_write(folder, site);
+    const oc_site_option_t paced = {.period_ms = 40, .repeat = 2, .is_looped = true, .has_keyframe_policy = true};
+    oc_capture_t *capture = oc_capture_open_site(folder, &paced, &no_option, &margin, error, sizeof error);
+    TEST_ASSERT_NOT_NULL_MESSAGE(capture, error);
+    TEST_ASSERT_EQUAL(0, capture->n_frames);
+    site_maker_remove(folder); /* it reads no file any more */
+    oc_captured_t frame;
+    const int64_t start_ns = 5000000000;
+    for (int i = 0; i < 20; i++) {
+        const int64_t due_ns = start_ns + i * 40000000LL;
+        int64_t wake_ns = -1;
+        if (i > 0) {
+            TEST_ASSERT_EQUAL(OC_CAPTURE_NONE, capture->next(capture, due_ns - 1, &frame, error, sizeof error));
+            TEST_ASSERT_EQUAL(0, capture->wait(capture, NULL, &wake_ns));
+            TEST_ASSERT_EQUAL_INT64(due_ns, wake_ns);
+        }
+        /* Asked late, it still gives every frame, dated when it was due. */
+        TEST_ASSERT_EQUAL(OC_CAPTURE_FRAME, capture->next(capture, due_ns + (i > 0) * 7, &frame, error, sizeof error));
+        TEST_ASSERT_EQUAL_INT64(due_ns, frame.arrived_ns);
+        TEST_ASSERT_EQUAL_INT64(1072915200000000 + i * 40000, frame.utime_us);
+        TEST_ASSERT_FALSE(frame.has_view_id || frame.is_forced);
+        TEST_ASSERT_EQUAL_UINT8(site_maker_pixel(i / 2 % 3, 10, 20, 1), frame.raw.px[20 * frame.raw.stride_bytes + 31]);
+    }
+    capture->close(capture);
+}
+
 static void margins_come_from_the_option_before_the_file_before_the_rule(void)
 {
     oc_capture_t *capture = open_site(&no_option);
@@ -269,6 +297,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(plays_its_views_in_order_with_their_numbers_and_times);
+    RUN_TEST(a_looped_site_goes_on_for_ever_with_times_that_go_on);
     RUN_TEST(margins_come_from_the_option_before_the_file_before_the_rule);
     RUN_TEST(the_area_comes_in_metres);
     RUN_TEST(refuses_a_bad_file);
