@@ -5,19 +5,17 @@
 tools/bench_report.py --from DIR                       DIR: accuracy.json, repeatability.json, thesis.json, ...
 tools/bench_report.py --from DIR --print               the bench's part to standard output, docs/ is left alone
 tools/bench_report.py                                  writes pictures and measurements.md again from docs/bench.json
-tools/bench_report.py --check                          exit 1 unless docs are what bench.json and measurements.json make
+tools/bench_report.py --check                          exit 1 unless docs are what bench.json, measurements.json and soak.json make
 
 tools/bench.sh runs the programs and then this. Standard library only.
 """
 import argparse
 import json
-import os
 import pathlib
-import platform
-import re
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+import about_machine  # noqa: E402
 import bench_document  # noqa: E402
 import bench_plot  # noqa: E402
 import measure_document  # noqa: E402
@@ -25,14 +23,6 @@ import measure_document  # noqa: E402
 DOCS = pathlib.Path(__file__).resolve().parent.parent / "docs"
 PARTS = ["accuracy", "repeatability", "thesis", "chess-stereo"]  # {"seed", "result"}
 PLAIN = ["speed", "instructions", "ground_labels", "ground_speed", "ground_table"]
-
-
-def machine():
-    try:
-        found = re.search(r"^model name\s*:\s*(.*)$", pathlib.Path("/proc/cpuinfo").read_text(), re.MULTILINE)
-    except OSError:
-        found = None
-    return f"{found.group(1) if found else platform.machine()}, {len(os.sched_getaffinity(0))} cores, one thread"
 
 
 def rounded(value):
@@ -44,7 +34,7 @@ def rounded(value):
 
 
 def gather(folder):
-    bench = {"machine": machine()}
+    bench = {"machine": about_machine.text() + ", one thread"}
     for name in PARTS:
         file = folder / f"{name}.json"
         if file.is_file():
@@ -78,7 +68,9 @@ def documents(bench):
     files = {"pictures/" + name: text for name, text in bench_plot.pictures(bench).items()}
     measured = DOCS / "measurements.json"
     if measured.is_file():
-        files["measurements.md"] = measure_document.text(json.loads(measured.read_text()), bench)
+        soak = DOCS / "soak.json"
+        files["measurements.md"] = measure_document.text(json.loads(measured.read_text()), bench,
+                                                         json.loads(soak.read_text()) if soak.is_file() else None)
     return files
 
 
@@ -104,7 +96,7 @@ def main():
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(text)
     for name in stale:
-        print(f"docs/{name} is not what docs/bench.json and docs/measurements.json make: run tools/bench_report.py")
+        print(f"docs/{name} is not what docs/bench.json, docs/measurements.json and docs/soak.json make: run tools/bench_report.py")
     return 1 if stale else 0
 
 

@@ -23,6 +23,7 @@ import tempfile
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+import about_machine  # noqa: E402
 import measure_document  # noqa: E402
 import measure_plot  # noqa: E402
 
@@ -230,8 +231,8 @@ def machine(bin_dir):
     compiler = first_match(r"^CMAKE_CXX_COMPILER:\w+=(.*)$", cache, "c++")
     _, version, fault = execute([compiler, "--version"])
     return {
-        "cpu": first_match(r"^model name\s*:\s*(.*)$", "/proc/cpuinfo", platform.machine()),
-        "cores": len(os.sched_getaffinity(0)),
+        "cpu": about_machine.cpu(),
+        "cores": about_machine.cores(),
         "os": first_match(r'^PRETTY_NAME="?([^"\n]*)', "/etc/os-release", platform.system()),
         "compiler": "unknown compiler" if fault else version.splitlines()[0],
         "build_type": first_match(r"^CMAKE_BUILD_TYPE:\w+=(.*)$", cache, "unknown"),
@@ -279,9 +280,9 @@ def json_text(result):
     return json.dumps(head)[:-1] + ', "runs": [\n' + runs + "\n]}\n"
 
 
-def bench_part():
-    """What tools/bench.sh measured last, or None."""
-    file = ROOT / "docs" / "bench.json"
+def part(name):
+    """What tools/bench.sh or tools/soak.sh measured last, or None."""
+    file = ROOT / "docs" / name
     return json.loads(file.read_text()) if file.is_file() else None
 
 
@@ -289,7 +290,7 @@ def main():
     options = parse_options()
     result = collect(options)
     is_partial = options.quick or options.only
-    document = measure_document.text(result, None if is_partial else bench_part())
+    document = measure_document.text(result, *([] if is_partial else [part("bench.json"), part("soak.json")]))
     if is_partial:
         print(document)
     else:

@@ -3,6 +3,7 @@
 from statistics import mean, median
 
 import bench_document
+import soak_document
 
 MIN_IOU = 0.3          # an obstacle below it counts as missed, as outcrop-eval counts
 MAX_FALSE = 1
@@ -362,8 +363,9 @@ def times_section(result):
             vehicle_table(runs) + "\nThe base by step, the whole drive, the evaluation:\n\n" + base_table(runs) + "\n")
 
 
-def text(result, bench=None):
-    """bench: what docs/bench.json holds, whose part stands at the end."""
+def text(result, bench=None, soak=None):
+    """bench, soak: what docs/bench.json and docs/soak.json hold, whose parts stand at the end."""
     parts = [head_section(result), targets_section(result), same_boxes_section(result), seeds_section(result),
              sites_section(result), repeats_section(result), real_section(result), times_section(result)]
-    return ("".join(parts) + (bench_document.text(bench) if bench else "")).rstrip() + "\n"
+    parts += [soak_document.text(soak), bench_document.text(bench) if bench else ""]
+    return "".join(parts).rstrip() + "\n"

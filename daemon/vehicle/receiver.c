@@ -133,6 +133,7 @@ oc_receiver_t *oc_receiver_open(const oc_receiver_config_t *config, oc_pose_trac
         snprintf(error, error_bytes, "out of memory");
         return NULL;
     }
+    memset(r->packets, 0xff, sizeof r->packets); /* so that its pages are there from the start */
     r->vehicle = config->vehicle;
     r->counters = counters;
     r->stop_fd = r->ready_fd = -1;

@@ -31,13 +31,14 @@ static void ask_for(peer_t *peer, const oc_view_head_t *head)
 {
     uint8_t packet[OC_MAX_DATAGRAM_BYTES];
     size_t n_bytes;
+    uint16_t n_taken;
     const uint32_t per_row = (head->camera.k.width_px + 7u) / 8u;
     static oc_patch_request_t patches;
     patches = (oc_patch_request_t){.view = head->view, .quality = 8, .n_blocks = 100};
     for (uint16_t i = 0; i < patches.n_blocks; i++)
         patches.blocks[i] = (uint16_t)(per_row * (10u + i / 20u) + 5u + i % 20u);
     oc_packet_head_t lead = {.vehicle = peer->vehicle, .sequence = peer->sequence++};
-    if (oc_packet_encode_patch_request(&lead, &patches, packet, sizeof packet, &n_bytes) == OC_OK)
+    if (oc_packet_encode_patch_request(&lead, &patches, packet, sizeof packet, &n_bytes, &n_taken) == OC_OK)
         send_packet(peer, packet, n_bytes);
 
     static oc_overhead_request_t tiles;
@@ -49,7 +50,7 @@ static void ask_for(peer_t *peer, const oc_view_head_t *head)
                                     .tiles = {{0, 0}, {-1, -1}}};
     oc_plane_image_from_ground(&head->camera, tiles.image_from_ground);
     lead.sequence = peer->sequence++;
-    if (oc_packet_encode_overhead_request(&lead, &tiles, packet, sizeof packet, &n_bytes) == OC_OK)
+    if (oc_packet_encode_overhead_request(&lead, &tiles, packet, sizeof packet, &n_bytes, &n_taken) == OC_OK)
         send_packet(peer, packet, n_bytes);
 
     const oc_resend_request_t again = {.view = head->view, .parts = 1};

@@ -11,7 +11,6 @@ import argparse
 import json
 import os
 import pathlib
-import platform
 import signal
 import socket
 import struct
@@ -19,6 +18,9 @@ import subprocess
 import sys
 import tempfile
 import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+import about_machine  # noqa: E402
 
 DOWN, UP = "udpm://239.255.76.67:7667?ttl=0", "udpm://239.255.76.68:7668?ttl=0"
 PERIOD_MS = 33
@@ -140,7 +142,7 @@ def judge(options, begin, samples, asked, pid):
         "peer": asked, "counters": {k: v for k, v in last["counters"].items() if v},
         "longest_silence_s": max(b["t_s"] - a["t_s"] for a, b in zip(samples, samples[1:]) if b["signs_of_life"] == 0)
         if any(s["signs_of_life"] == 0 for s in samples[1:]) else 0,
-        "machine": platform.machine(), "cpus": os.cpu_count(),
+        "machine": about_machine.text(), "settling_s": round(options.seconds - seconds),
     }
     faults = []
     if result["rss_anon_growth_kb"] > MAX_GROWTH_KB:
