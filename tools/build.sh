@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Set-up and build, nothing that is already there twice: build.sh [release|debug-asan|aarch64|fuzz] [TARGET]...
+# Set-up and build, nothing that is already there twice: build.sh [release|debug-asan|debug-tsan|aarch64|fuzz] [TARGET]...
 # aarch64 is the vehicle's half for 64-bit Arm, fuzz the fuzzers, with clang.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -9,9 +9,9 @@ preset=${1:-release}
 shift $(($# > 0 ? 1 : 0))
 case "$preset" in
     release) build=build ;;
-    debug-asan) build=build-asan ;;
+    debug-asan | debug-tsan) build=build-${preset#debug-} ;;
     aarch64 | fuzz) build=build-$preset ;;
-    *) echo "usage: tools/build.sh [release|debug-asan|aarch64|fuzz] [TARGET]..." >&2; exit 1 ;;
+    *) echo "usage: tools/build.sh [release|debug-asan|debug-tsan|aarch64|fuzz] [TARGET]..." >&2; exit 1 ;;
 esac
 
 tools/setup.sh

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Set-up, build and tests; the last line counts test cases: test.sh [release|debug-asan|aarch64|fuzz] [LABEL]
-# LABEL (unit or site) builds and runs only that kind.
+# Set-up, build and tests; the last line counts test cases: test.sh [release|debug-asan|debug-tsan|aarch64|fuzz] [LABEL]
+# LABEL (unit, site or threads) builds and runs only that kind.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -10,7 +10,7 @@ preset=${1:-release}
 label=${2-}
 case "$preset" in
     release) build=build ;;
-    debug-asan) build=build-asan ;;
+    debug-asan | debug-tsan) build=build-${preset#debug-} ;;
     *) build=build-$preset ;; # which build.sh knows or refuses
 esac
 tools/build.sh "$preset" ${label:+"tests_$label"}

@@ -33,6 +33,7 @@ endfunction()
 # All test programs of a kind, without the rest.
 add_custom_target(tests_unit)
 add_custom_target(tests_site)
+add_custom_target(tests_threads)
 
 # What all test programs share: where they are built, where test data is.
 function(outcrop_test_program name)
