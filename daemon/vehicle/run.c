@@ -172,7 +172,7 @@ static bool run_take_frame(vehicle_run_t *run)
     const oc_capture_result_t result = run->capture->next(run->capture, oc_mono_ns(), &captured, error, sizeof error);
     switch (result) {
     case OC_CAPTURE_NONE: return false;
-    case OC_CAPTURE_ERROR: fprintf(stderr, "outcropd: %s\n", error); return false;
+    case OC_CAPTURE_ERROR: fprintf(stderr, "outcropd: %s\n", error); return true;
     case OC_CAPTURE_DONE:
         run->is_source_done = true;
         run->next_status_ns = oc_mono_ns(); /* say so at once */
