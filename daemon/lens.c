@@ -144,7 +144,7 @@ static double positive_until(const double c[], int degree, double end)
 static double reach_of_fisheye(const double k[5])
 {
     const double slope[5] = {1, 3 * k[0], 5 * k[1], 7 * k[2], 9 * k[3]};
-    const double end = M_PI_2 * M_PI_2, until = positive_until(slope, 4, end);
+    const double right_angle = 2 * atan(1), end = right_angle * right_angle, until = positive_until(slope, 4, end);
     return until < end ? tan(sqrt(until)) : (double)INFINITY;
 }
 
