@@ -42,7 +42,11 @@ typedef struct event_reader {
     yaml_parser_t parser;
     yaml_event_t event; /* the last; owned until the next */
     bool has_event;
+    int depth; /* of lists and mappings */
 } event_reader_t;
+
+/* libyaml takes quadratic time to see through deeply nested ones. */
+#define MAX_DEPTH 16
 
 void oc_calibration_refuse(oc_calibration_file_t *file, int line, const char *format, ...)
 {
@@ -79,6 +83,13 @@ static void refuse_yaml(event_reader_t *r)
     oc_calibration_refuse(r->file, line, "not YAML: %s", p->problem ? p->problem : "cannot be parsed");
 }
 
+/* What the event opens, less what it closes. */
+static int depth_of(yaml_event_type_t type)
+{
+    if (type == YAML_SEQUENCE_START_EVENT || type == YAML_MAPPING_START_EVENT) return 1;
+    return type == YAML_SEQUENCE_END_EVENT || type == YAML_MAPPING_END_EVENT ? -1 : 0;
+}
+
 static bool next_event(event_reader_t *r)
 {
     if (r->has_event) yaml_event_delete(&r->event);
@@ -88,6 +99,8 @@ static bool next_event(event_reader_t *r)
         return false;
     }
     if (r->event.type == YAML_ALIAS_EVENT) oc_calibration_refuse(r->file, line_of(r), "aliases are not understood");
+    r->depth += depth_of(r->event.type);
+    if (r->depth > MAX_DEPTH) oc_calibration_refuse(r->file, line_of(r), "nested more than %d deep", MAX_DEPTH);
     return !r->file->is_bad;
 }
 
@@ -106,12 +119,9 @@ static const char *scalar_of(const event_reader_t *r)
 /* The value that the last event begins, and all that is in it. */
 static void skip_value(event_reader_t *r)
 {
-    int depth = 0;
-    do {
-        const yaml_event_type_t type = r->event.type;
-        if (type == YAML_SEQUENCE_START_EVENT || type == YAML_MAPPING_START_EVENT) depth++;
-        if (type == YAML_SEQUENCE_END_EVENT || type == YAML_MAPPING_END_EVENT) depth--;
-    } while (depth > 0 && next_event(r));
+    const int outside = r->depth - (depth_of(r->event.type) > 0);
+    while (r->depth > outside && next_event(r)) {
+    }
 }
 
 /* ---- values ---- */

@@ -162,9 +162,8 @@ static void what_is_said_otherwise_is_understood(void)
     TEST_ASSERT_TRUE_MESSAGE(read_changed(ros, "322.79794,   0.     ", "322.79794,   -47.25"), error);
     TEST_ASSERT_TRUE(calibration.lens.rectified.cx_px == 322.79794);
     TEST_ASSERT_TRUE_MESSAGE(read_changed(ros, "  data: [1., 0., 0.,", "  data: [1., 9e-7, 0.,"), error);
-    static const char none[] = "K: [9, 0, 20, 0, 9, 20, 0, 0, 1]
-        D : [] image_width : 32 image_height : 4096 ";
-            TEST_ASSERT_TRUE_MESSAGE(read_bytes(none, sizeof none - 1), error);
+    static const char none[] = "K: [9, 0, 20, 0, 9, 20, 0, 0, 1]\nD: []\nimage_width: 32\nimage_height: 4096\n";
+    TEST_ASSERT_TRUE_MESSAGE(read_bytes(none, sizeof none - 1), error);
     TEST_ASSERT_EQUAL(OC_LENS_PINHOLE, calibration.lens.model);
     TEST_ASSERT_EQUAL(4096, calibration.lens.raw.height_px);
     /* Fewer coefficients: the others are 0. */
@@ -263,8 +262,13 @@ static void bombs_and_large_files_are_refused(void)
     TEST_ASSERT_TRUE_MESSAGE(read_bytes(large, 65536), error);
     memset(large, '[', sizeof large);
     TEST_ASSERT_FALSE(read_bytes(large, 65536));
+    /* Which libyaml would take seconds over. */
     memset(large, '{', sizeof large);
     TEST_ASSERT_FALSE(read_bytes(large, 65536));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error, ":1: nested more than 16 deep"), error);
+    expect_refused("x", "x", "a: 1\nb: [[[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]]", 2, "nested more than 16 deep");
+    TEST_ASSERT_TRUE_MESSAGE(read_changed(ros, "camera_name", "b: [[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]\ncamera_name"),
+                             error);
     TEST_ASSERT_FALSE(oc_calibration_read("/nowhere/at/all", &calibration, error, sizeof error));
     TEST_ASSERT_EQUAL_STRING("/nowhere/at/all: cannot be read: No such file or directory", error);
     TEST_ASSERT_FALSE(oc_calibration_read("/", &calibration, error, sizeof error));
