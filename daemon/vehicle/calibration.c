@@ -165,6 +165,15 @@ bool oc_calibration_read(const char *path, oc_calibration_t *calibration, char *
 
 /* ---- writing ---- */
 
+/* All 17 digits, and a point in any case: YAML 1.1 readers take "1e+22" for a word. */
+static void write_number(FILE *out, double number)
+{
+    char text[40];
+    snprintf(text, sizeof text, "%.17g", number);
+    const size_t n_digits = strcspn(text, "e");
+    fprintf(out, "%.*s%s%s", (int)n_digits, text, strchr(text, '.') ? "" : ".0", text + n_digits);
+}
+
 static void write_matrix(FILE *out, oc_calibration_form_t form, const char *key, uint32_t rows, uint32_t cols,
                          const double *m)
 {
@@ -175,8 +184,8 @@ static void write_matrix(FILE *out, oc_calibration_form_t form, const char *key,
     if (is_opencv) fprintf(out, "%sdt: d\n", indent);
     fprintf(out, "%sdata: [", indent);
     for (uint32_t i = 0; i < rows * cols; i++) {
-        if (i > 0) fprintf(out, i % 3 == 0 ? ",\n%s    " : ", ", indent);
-        fprintf(out, "%.17g", m[i]);
+        if (i > 0) fprintf(out, i % cols == 0 && cols > 1 ? ",\n%s    " : ", ", indent);
+        write_number(out, m[i]);
     }
     fprintf(out, "]\n");
 }

@@ -348,6 +348,30 @@ static void what_is_written_reads_back_to_the_bit(void)
     }
 }
 
+/* A YAML 1.1 reader would take "1e+22" for a word, and "500" for a whole number. */
+static void each_number_is_written_with_a_point(void)
+{
+    TEST_ASSERT_TRUE(read_bytes(ros, sizeof ros - 1));
+    calibration.lens.raw.fx_px = 1e22;
+    calibration.lens.raw.fy_px = 500;
+    calibration.lens.k[2] = -1e-300;
+    write_file(&calibration, OC_CALIBRATION_ROS, true);
+    char text[2048] = "";
+    FILE *in = fopen(path, "rb");
+    TEST_ASSERT_NOT_NULL(in);
+    TEST_ASSERT_TRUE(fread(text, 1, sizeof text - 1, in) > 0);
+    TEST_ASSERT_EQUAL(0, fclose(in));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "data: [1.0e+22, 0.0, 305.59368"), text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "0.0, 500.0, 243.7383"), text);
+    int n_points = 0, n_commas = 0;
+    for (const char *c = text; *c; c++) {
+        n_points += *c == '.';
+        n_commas += *c == ',';
+    }
+    TEST_ASSERT_EQUAL(9 + 5 + 9 + 12, n_points);
+    TEST_ASSERT_EQUAL(8 + 4 + 8 + 11, n_commas);
+}
+
 static void what_cannot_be_told_is_not_written(void)
 {
     oc_calibration_t good;
@@ -428,6 +452,7 @@ int main(void)
     RUN_TEST(files_that_are_none_are_refused);
     RUN_TEST(bombs_and_large_files_are_refused);
     RUN_TEST(what_is_written_reads_back_to_the_bit);
+    RUN_TEST(each_number_is_written_with_a_point);
     RUN_TEST(what_cannot_be_told_is_not_written);
     RUN_TEST(damaged_files_are_refused_or_make_a_valid_lens);
     return UNITY_END();
