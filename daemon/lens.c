@@ -161,7 +161,7 @@ static double reach_of_plumb_bob(const double k[5])
 double oc_lens_reach(const oc_lens_t *lens)
 {
     for (int i = 0; i < 5; i++) {
-        if (lens->model != OC_LENS_PINHOLE && !(fabs(lens->k[i]) < 1e100)) return 0;
+        if (lens->model != OC_LENS_PINHOLE && !isfinite(lens->k[i])) return 0;
     }
     if (lens->model == OC_LENS_FISHEYE) return reach_of_fisheye(lens->k);
     return lens->model == OC_LENS_PLUMB_BOB ? reach_of_plumb_bob(lens->k) : (double)INFINITY;

@@ -236,6 +236,9 @@ static void models_that_are_not_ours_are_refused(void)
     expect_refused(ros, "plumb_bob", "equidistant", 11, "a fisheye has 4, not 5");
     expect_refused(ros, "cols: 5\n  data: [-0.361976, ", "cols: 8\n  data: [0, 0, 0, -0.361976, ", 11,
                    "recalibrate with plumb_bob");
+    expect_refused(ros, "cols: 5\n  data: [-0.361976, 0.110510, 0.001014, 0.000505, 0.000000]",
+                   "cols: 6\n  data: [-0.361976, 0.110510, 0.001014, 0.000505, 0.000000, 1e-300]", 11,
+                   "recalibrate with plumb_bob");
     expect_refused(opencv, "fisheye_model: 1", "fisheye_model: 2", 7, "neither 0 nor 1");
     expect_refused(opencv, "flags: 0", "distortion_model: plumb_bob", 7, "contradicts");
     expect_refused(ros, "distortion_coefficients", "distortion", 1, "distortion_coefficients: missing");

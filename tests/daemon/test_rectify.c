@@ -204,6 +204,62 @@ static void any_sides_will_do(void)
     }
 }
 
+/* Ramps of whole levels are interpolated exactly: channel 0 downwards, 1 to the right by the level of a
+ * chroma sample, 2 downwards by that. */
+static double ramp(oc_pixel_format_t format, double x, double y, int channel)
+{
+    const bool is_planar = format == OC_PIXEL_NV12;
+    if (channel == 0) return 80 + y;
+    if (channel == 1) return is_yuv(format) ? 80 + 2 * fmin(fmax((x - 0.5) / 2, 0), 48) : 80 + x;
+    return 90 + (is_planar ? 2 * fmin(fmax((y - 0.5) / 2, 0), 40) : y);
+}
+
+static void fill_with_ramps(const oc_raw_image_t *raw)
+{
+    for (uint32_t p = 0; p < raw->width_px * raw->height_px; p++) {
+        const uint32_t x = p % raw->width_px, y = p / raw->width_px;
+        const bool is_halved = is_yuv(raw->format), is_planar = raw->format == OC_PIXEL_NV12;
+        *sample_at(raw, x, y, 0) = (uint8_t)(80 + y);
+        if (raw->format == OC_PIXEL_GREY) continue;
+        *sample_at(raw, x, y, 1) = (uint8_t)(80 + (is_halved ? x & ~1u : x));
+        *sample_at(raw, x, y, 2) = (uint8_t)(90 + (is_planar ? y & ~1u : y));
+    }
+}
+
+/* So that half a pixel off is seen, in chroma too; beyond the outermost chroma samples those hold. */
+static void check_ramps(const oc_raw_image_t *raw, const oc_lens_t *lens)
+{
+    const oc_image_t flat = oc_rectify_apply(rectify, raw, lens);
+    const uint32_t width = flat.width_px;
+    for (uint32_t p = 0; p < width * flat.height_px; p++) {
+        double x, y, rgb[3] = {0, 0, 0};
+        const bool is_seen = oc_lens_find(lens, oc_lens_reach(lens), p % width, p / width, &x, &y);
+        for (int c = 0; c < 3 && is_seen; c++) rgb[c] = ramp(raw->format, x, y, c);
+        if (is_seen && is_yuv(raw->format)) rgb_of(rgb[0], rgb[1], rgb[2], rgb);
+        const double tolerance = is_yuv(raw->format) ? 0.65 : 0.51;
+        for (uint32_t c = 0; c < flat.channels; c++)
+            TEST_ASSERT_DOUBLE_WITHIN(is_seen ? tolerance : 0.0, rgb[c], flat.px[flat.channels * p + c]);
+    }
+}
+
+static void samples_are_where_the_format_has_them(void)
+{
+    for (int i = 0; i < N_FORMATS; i++) {
+        const uint32_t width = oc_pixel_format_row_bytes(formats[i], 97) == 0 ? 98 : 97;
+        const oc_intrinsics_t k = camera_of(width, 81);
+        oc_lens_t lens = oc_lens_pinhole(&k);
+        const oc_raw_image_t raw = make_raw(formats[i], width, 81);
+        fill_with_ramps(&raw);
+        lens.rectified.fx_px *= 1.37;
+        lens.rectified.fy_px *= 1.21;
+        for (int shift = -1; shift <= 1; shift++) { /* over the borders as well */
+            lens.rectified.cx_px = k.cx_px * 1.37 + shift * 50.3;
+            lens.rectified.cy_px = k.cy_px * 1.21 + shift * 40.6;
+            check_ramps(&raw, &lens);
+        }
+    }
+}
+
 /* Shifted by whole pixels: nothing is interpolated, and the outermost rows and columns are there. */
 static void a_crop_is_the_part_that_it_shows(void)
 {
@@ -399,6 +455,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(pixels_come_from_where_the_lens_put_them);
     RUN_TEST(any_sides_will_do);
+    RUN_TEST(samples_are_where_the_format_has_them);
     RUN_TEST(a_crop_is_the_part_that_it_shows);
     RUN_TEST(grey_and_rgb_without_distortion_are_not_copied);
     RUN_TEST(yuv_without_distortion_is_the_formula);
