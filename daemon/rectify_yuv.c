@@ -123,19 +123,27 @@ static inline uint32_t chroma_cell(uint32_t luma, uint32_t weight, uint32_t n_sa
     return cell;
 }
 
-/* Bilinear; weights are shares of 1 << x_bits and 1 << y_bits. The sum has both bits behind the point. */
-static inline int32_t blend(const uint8_t *top, const uint8_t *low, uint32_t step, int32_t wx, int x_bits, int32_t wy,
-                            int y_bits)
+/* Bilinear between four numbers; weights are shares of 1 << x_bits and 1 << y_bits, and the sum has both
+ * bits behind the point. Each number may be two, each in 32 bits, of which 26 are used. */
+static inline uint64_t blend(const uint64_t v[4], uint32_t wx, int x_bits, uint32_t wy, int y_bits)
 {
-    const int32_t a = (top[0] << x_bits) + (top[step] - top[0]) * wx;
-    const int32_t b = (low[0] << x_bits) + (low[step] - low[0]) * wx;
-    return (a << y_bits) + (b - a) * wy;
+    const uint64_t top = v[0] * ((1u << x_bits) - wx) + v[1] * wx;
+    const uint64_t low = v[2] * ((1u << x_bits) - wx) + v[3] * wx;
+    return top * ((1u << y_bits) - wy) + low * wy;
 }
 
-static inline int32_t luma_of(const oc_raw_image_t *raw, const yuv_layout_t *at, oc_rectify_cell_t cell)
+static inline uint32_t luma_of(const oc_raw_image_t *raw, const yuv_layout_t *at, oc_rectify_cell_t cell)
 {
     const uint8_t *top = raw->px + (size_t)cell.y * raw->stride_bytes + at->y_step * cell.x + at->y_first;
-    return blend(top, top + raw->stride_bytes, at->y_step, cell.wx, 8, cell.wy, 8);
+    const uint8_t *low = top + raw->stride_bytes;
+    const uint64_t v[4] = {top[0], top[at->y_step], low[0], low[at->y_step]};
+    return (uint32_t)blend(v, cell.wx, 8, cell.wy, 8);
+}
+
+/* A chroma sample: U in the lower half, V in the upper. */
+static inline uint64_t uv_pair(const uint8_t *sample, const yuv_layout_t *at)
+{
+    return sample[at->u_at] | (uint64_t)sample[at->v_at] << 32;
 }
 
 static inline void gather_pixel(const oc_raw_image_t *raw, const yuv_layout_t *at, oc_rectify_cell_t cell,
@@ -147,11 +155,12 @@ static inline void gather_pixel(const oc_raw_image_t *raw, const yuv_layout_t *a
     if (at->is_planar) row = chroma_cell(cell.y, cell.wy, (raw->height_px + 1) / 2, &wy);
     const uint8_t *plane = at->is_planar ? raw->chroma : raw->px;
     const uint8_t *top = plane + (size_t)row * raw->stride_bytes + at->uv_step * column, *low = top + raw->stride_bytes;
-    const int32_t u = blend(top + at->u_at, low + at->u_at, at->uv_step, (int32_t)wx, 9, (int32_t)wy, y_bits);
-    const int32_t v = blend(top + at->v_at, low + at->v_at, at->uv_step, (int32_t)wx, 9, (int32_t)wy, y_bits);
-    out->y[i] = (int16_t)((luma_of(raw, at, cell) >> 9) - 16 * 128);
-    out->u[i] = (int16_t)((u >> drop) - 128 * 256);
-    out->v[i] = (int16_t)((v >> drop) - 128 * 256);
+    const uint64_t v[4] = {uv_pair(top, at), uv_pair(top + at->uv_step, at), uv_pair(low, at),
+                           uv_pair(low + at->uv_step, at)};
+    const uint64_t uv = blend(v, wx, 9, wy, y_bits);
+    out->y[i] = (int16_t)((int32_t)(luma_of(raw, at, cell) >> 9) - 16 * 128);
+    out->u[i] = (int16_t)((int32_t)((uint32_t)uv >> drop) - 128 * 256);
+    out->v[i] = (int16_t)((int32_t)((uint32_t)(uv >> 32) >> drop) - 128 * 256);
 }
 
 static inline void gather_row(const oc_raw_image_t *raw, const yuv_layout_t *at, const oc_rectify_cell_t *cells,
