@@ -10,12 +10,14 @@
 static void print_help(void)
 {
     puts("Usage: outcropd --config FILE [--check]\n"
+         "       outcropd --print-config\n"
          "\n"
          "The vehicle's end: finds junctions in frames, drops those on the ground,\n"
          "sends packets over LCM and answers the base's requests until SIGTERM.\n"
          "\n"
-         "  -c, --config FILE  YAML configuration; keys in docs/operating.md\n"
+         "  -c, --config FILE  YAML configuration\n"
          "      --check        check the configuration and the source, then exit\n"
+         "      --print-config print a sample configuration: every key with unit, range, default\n"
          "  -h, --help         this text\n"
          "  -V, --version      version\n"
          "\n"
@@ -52,9 +54,10 @@ static int serve(const char *path, bool is_check)
 
 int main(int argc, char **argv)
 {
-    enum { CHECK = 256 };
+    enum { CHECK = 256, PRINT_CONFIG };
     static const struct option options[] = {{"config", required_argument, NULL, 'c'},
                                             {"check", no_argument, NULL, CHECK},
+                                            {"print-config", no_argument, NULL, PRINT_CONFIG},
                                             {"help", no_argument, NULL, 'h'},
                                             {"version", no_argument, NULL, 'V'},
                                             {NULL, 0, NULL, 0}};
@@ -64,6 +67,7 @@ int main(int argc, char **argv)
         switch (option) {
         case 'c': config = optarg; break;
         case CHECK: is_check = true; break;
+        case PRINT_CONFIG: return oc_config_print_sample(stdout) ? 0 : 1;
         case 'h': print_help(); return 0;
         case 'V': puts("outcropd " OUTCROP_VERSION); return 0;
         default: fputs("Try outcropd --help.\n", stderr); return 2;
