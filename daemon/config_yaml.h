@@ -73,6 +73,13 @@ const char *oc_yaml_text_or_default(const oc_yaml_t *yaml, const char *path);
 /* Keep a fault, at the line of the key or of what it would stand in. path "" = the file's top. */
 __attribute__((format(printf, 3, 4))) void oc_yaml_refuse(oc_yaml_t *yaml, const char *path, const char *format, ...);
 
+/* For a row's check: NULL, or why a text is no LCM URL. */
+const char *oc_yaml_url_fault(const char *text);
+
+/* A list [x_min, x_max, y_min, y_max, z_max] of metres, if it is given and its numbers are: refused unless it ascends
+ * as float32, as which it travels, and z_max is above 0. */
+void oc_yaml_check_area(oc_yaml_t *yaml, const char *path);
+
 /* The file as the schema's structure, NULL while there are faults (one more if libcyaml finds one). */
 void *oc_yaml_load(oc_yaml_t *yaml);
 void oc_yaml_free(const oc_yaml_form_t *form, void *data);

@@ -171,3 +171,23 @@ const char *oc_yaml_scalar_fault(const cyaml_schema_value_t *schema, const oc_ya
     default: return "has a type that is not handled";
     }
 }
+
+const char *oc_yaml_url_fault(const char *text)
+{
+    const size_t n = strspn(text, "abcdefghijklmnopqrstuvwxyz0123456789");
+    return n > 0 && strncmp(text + n, "://", 3) == 0 ? NULL : "is not an LCM URL, as udpm://239.255.76.67:7667?ttl=1";
+}
+
+void oc_yaml_check_area(oc_yaml_t *yaml, const char *path)
+{
+    double v[5];
+    for (int i = 0; i < 5; i++) {
+        char item[OC_YAML_PATH_BYTES];
+        snprintf(item, sizeof item, "%.60s[%d]", path, i);
+        const char *text = oc_yaml_text(yaml, item);
+        if (!text) return;
+        v[i] = strtod(text, NULL);
+    }
+    if (!((float)v[0] < (float)v[1] && (float)v[2] < (float)v[3] && v[4] >= 1e-6))
+        oc_yaml_refuse(yaml, path, "must be [x_min, x_max, y_min, y_max, z_max], ascending, z_max above 0");
+}

@@ -184,21 +184,6 @@ static void check_gpio(oc_yaml_t *yaml)
 
 /* ---- the rest ---- */
 
-static void check_area(oc_yaml_t *yaml)
-{
-    double v[5];
-    for (int i = 0; i < 5; i++) {
-        char path[OC_YAML_PATH_BYTES];
-        snprintf(path, sizeof path, "area[%d]", i);
-        const char *text = oc_yaml_text(yaml, path);
-        if (!text) return;
-        v[i] = strtod(text, NULL);
-    }
-    /* As they travel. */
-    if (!((float)v[0] < (float)v[1] && (float)v[2] < (float)v[3] && v[4] >= 1e-6))
-        oc_yaml_refuse(yaml, "area", "must be [x_min, x_max, y_min, y_max, z_max], ascending, z_max above 0");
-}
-
 static void check_junctions(oc_yaml_t *yaml)
 {
     double least, most;
@@ -214,6 +199,6 @@ void oc_config_check(oc_yaml_t *yaml, oc_lens_t *lenses)
     check_cameras(yaml, lenses);
     check_margins(yaml);
     check_gpio(yaml);
-    check_area(yaml);
+    oc_yaml_check_area(yaml, "area");
     check_junctions(yaml);
 }

@@ -6,12 +6,6 @@
 
 /* ---- what texts must look like ---- */
 
-static const char *url_fault(const char *text)
-{
-    const size_t n = strspn(text, "abcdefghijklmnopqrstuvwxyz0123456789");
-    return n > 0 && strncmp(text + n, "://", 3) == 0 ? NULL : "is not an LCM URL, as udpm://239.255.76.67:7667?ttl=1";
-}
-
 static const char *name_fault(const char *text)
 {
     return text[strspn(text, "abcdefghijklmnopqrstuvwxyz0123456789_-")] ? "has other characters than a-z, 0-9, _ and -"
@@ -25,7 +19,7 @@ static const char *device_fault(const char *text)
 
 /* ---- the table ---- */
 
-#define URL .form = "LCM URL", .check = url_fault
+#define URL .form = "LCM URL", .check = oc_yaml_url_fault
 #define YES_NO .fallback = "false"
 #define METRES .unit = "m", .low = -100, .high = 100, .example = "0"
 #define DEGREES .unit = "degrees", .low = -180, .high = 180, .example = "0"
