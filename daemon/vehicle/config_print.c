@@ -16,7 +16,7 @@ bool oc_config_print_sample(FILE *out)
 
 static const char manual_head[] =
     ".\\\" SPDX-License-Identifier: BSD-3-Clause\n"
-    ".Dd January 1, 2026\n"
+    ".Dd November 25, 2026\n"
     ".Dt OUTCROPD.YAML 5\n"
     ".Os Outcrop\n"
     ".Sh NAME\n"
