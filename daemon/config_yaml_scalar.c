@@ -22,9 +22,10 @@ static const char *quote(const scalar_check_t *check, const char *complaint)
     return check->what;
 }
 
-/* -?digits, without needless zeros: 010 is eight to some and ten to others. */
+/* A sign or none and digits, without needless zeros: 010 is eight to some and ten to others. */
 static bool is_whole_number(const char *text)
 {
+    if (strcmp(text, "-0") == 0) return false;
     if (*text == '-' || *text == '+') text++;
     if (text[0] == '0' && text[1]) return false;
     const size_t n = strspn(text, "0123456789");

@@ -293,6 +293,7 @@ static void values_are_taken_strictly(void)
     static const fault_case_t cases[] = {
         {"vehicle: 010\n" LINK SITE, "1: vehicle: \"010\" is not a whole number"},
         {"vehicle: 0x10\n" LINK SITE, "1: vehicle: \"0x10\" is not a whole number"},
+        {"vehicle: -0\n" LINK SITE, "1: vehicle: \"-0\" is not a whole number"},
         {"vehicle: 1.0\n" LINK SITE, "1: vehicle: \"1.0\" is not a whole number"},
         {"vehicle: 99999999999999999999\n" LINK SITE, "1: vehicle: 99999999999999999999 is not within 0..255"},
         {"vehicle: -1\n" LINK SITE, "1: vehicle: -1 is not within 0..255"},

@@ -350,6 +350,10 @@ static void check_told_lines(void)
     for (int i = 0; i < n_told; i++) {
         TEST_ASSERT_EQUAL_STRING_LEN(file_path, told[i], strlen(file_path));
         TEST_ASSERT_TRUE(strlen(told[i]) < 1200);
+        /* Without a line are only faults of the whole file; what libcyaml alone would find is not among them. */
+        const char *rest = told[i] + strlen(file_path) + 1;
+        TEST_ASSERT_TRUE_MESSAGE(atoi(rest) > 0 || strcmp(rest, " is empty") == 0 || starts_with(rest, " more than"),
+                                 told[i]);
         for (const unsigned char *c = (const unsigned char *)told[i]; *c; c++)
             TEST_ASSERT_TRUE_MESSAGE(*c >= 0x20 && *c != 0x7f, "a control character is told");
     }
@@ -374,6 +378,39 @@ static void damaged_files_do_no_harm(void)
     TEST_ASSERT_TRUE(n_taken > 20 && n_refused > 1000);
 }
 
+/* ---- numbers, however they are written ---- */
+
+/* Random texts of the letters of numbers: what is taken is what strtod makes of all of it, and libcyaml agrees. */
+static void numbers_are_what_they_say(void)
+{
+    static const char letters[] = "0011259+-..eEx_nai ";
+    int n_taken = 0, n_told_in_all = 0;
+    for (int round = 0; round < 20000; round++) {
+        const bool is_whole = random_below(2);
+        char number[12], file[300], *end;
+        const uint32_t n = 1 + random_below(6);
+        for (uint32_t i = 0; i < n; i++) number[i] = letters[random_below(sizeof letters - 1)];
+        number[n] = '\0';
+        snprintf(file, sizeof file, "link: {down_url: memq://, up_url: memq://}\nsource: {site: s}\n%s: \"%s\"\n",
+                 is_whole ? "stored_views" : "margins:\n  position_m", number);
+        const double value = strtod(number, &end);
+        if (!load(file, &config)) {
+            n_told_in_all += n_told;
+            TEST_ASSERT_EQUAL_INT_MESSAGE(1, n_told, number);
+            TEST_ASSERT_EQUAL_INT_MESSAGE(is_whole ? 3 : 4, line_in(told[0]), told[0]);
+            continue;
+        }
+        n_taken++;
+        TEST_ASSERT_EQUAL_MESSAGE('\0', *end, number);
+        TEST_ASSERT_FALSE_MESSAGE(strpbrk(number, " xn_"), number);
+        if (is_whole)
+            TEST_ASSERT_EQUAL_DOUBLE(value, config.vehicle.stored_views);
+        else
+            TEST_ASSERT_EQUAL_DOUBLE(value, config.margin.position_m);
+    }
+    TEST_ASSERT_TRUE(n_taken > 500 && n_told_in_all > 5000);
+}
+
 int main(int argc, char **argv)
 {
     if (argc > 1) seed = strtoull(argv[1], NULL, 10);
@@ -381,6 +418,7 @@ int main(int argc, char **argv)
     RUN_TEST(every_fault_is_told_with_its_line);
     RUN_TEST(every_key_has_every_fault);
     RUN_TEST(the_ends_of_every_range_are_taken);
+    RUN_TEST(numbers_are_what_they_say);
     RUN_TEST(damaged_files_do_no_harm);
     return UNITY_END();
 }
