@@ -394,6 +394,17 @@ static void large_files_end(void)
     TEST_ASSERT_TRUE(ends_with(told[n_told - 1], ": more than 200 faults: the rest is not told"));
 }
 
+/* Of too long a list only as many items are looked at as it may have. */
+static void long_lists_are_cut(void)
+{
+    char text[4000] = LINK "poses: {url: memq://}\ncameras:\n";
+    for (int i = 0; i < 300; i++) strcat(text, "  - x\n");
+    TEST_ASSERT_FALSE(load(text, &config));
+    TEST_ASSERT_EQUAL(9, n_told);
+    TEST_ASSERT_TRUE(ends_with(told[0], ":5: cameras: has 300 items, not 1 to 8"));
+    TEST_ASSERT_TRUE(ends_with(told[8], ":13: cameras[7]: must be a section: keys on lines of their own"));
+}
+
 static void a_faulty_file_leaves_the_configuration_alone(void)
 {
     oc_config_t before;
@@ -416,6 +427,7 @@ int main(void)
     RUN_TEST(values_are_taken_strictly);
     RUN_TEST(what_is_no_configuration_is_one_line);
     RUN_TEST(large_files_end);
+    RUN_TEST(long_lists_are_cut);
     RUN_TEST(a_faulty_file_leaves_the_configuration_alone);
     return UNITY_END();
 }
