@@ -20,6 +20,9 @@ typedef enum oc_pose_type {
 typedef struct oc_counters oc_counters_t; /* counters.h, whose atomics are C */
 typedef struct oc_pose_listener oc_pose_listener_t;
 
+/* An LCM payload as a body pose; false when it is not of the type, cut or too long. Its values are not looked at. */
+bool oc_pose_decode(oc_pose_type_t type, const void *bytes, size_t n_bytes, oc_body_pose_t *pose);
+
 /* Subscribe, and add every pose that comes to the track, counted in POSES_IN,
  * POSES_BAD, POSES_LATE. NULL and one line in error when the URL cannot be opened. */
 oc_pose_listener_t *oc_pose_listener_open(const char *url, const char *channel, oc_pose_type_t type,
