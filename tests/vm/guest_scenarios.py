@@ -367,9 +367,9 @@ def run_scenario(name, scenario):
         verdict, reason = "PASS", ""
     except Failed as failure:
         verdict, reason = "FAIL", f": {failure}"
-    except Exception as failure:  # a fault of the test itself is told with its place
-        verdict, reason = "FAIL", f": {type(failure).__name__}: {failure}"
-        traceback.print_exc()
+    except Exception as failure:  # a fault of the test itself
+        place = traceback.extract_tb(failure.__traceback__)[-1]
+        verdict, reason = "FAIL", f": {type(failure).__name__}: {failure} ({place.filename}:{place.lineno})"
     print(f"{verdict} {name} ({time.monotonic() - started:.1f} s){reason}", flush=True)
     return verdict == "PASS"
 
