@@ -251,8 +251,10 @@ class UsbCamera(Program):
     @contextlib.contextmanager
     def with_fault(self, fault):
         self.tell(f"{fault} on")
-        yield
-        self.tell(f"{fault} off")
+        try:
+            yield
+        finally:
+            self.tell(f"{fault} off")
 
     def unplug(self):
         self.disable.write_text("1")

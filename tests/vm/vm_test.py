@@ -15,7 +15,7 @@ import tempfile
 HERE = pathlib.Path(__file__).resolve().parent
 SITE = HERE.parent / "data/sites/depot"
 PROGRAMS = ("qemu-system-x86_64", "busybox", "cpio", "xz", "modprobe", "v4l2-ctl", "udevadm")
-USB = ("uvcvideo", "dummy_hcd", "gadgetfs")
+USB = ("uvcvideo nodrop=1", "dummy_hcd", "gadgetfs")  # nodrop: damaged frames come through, flagged
 
 # Modules, and whether systemd and udevd are wanted.
 GROUPS = {"vivid": (("vivid n_devs=2 node_types=0x1,0x1",), False), "usb": (USB, True),
