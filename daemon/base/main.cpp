@@ -20,11 +20,15 @@ void say(const std::string &text)
     std::fflush(stdout);
 }
 
+void print_fault(void *, const char *line)
+{
+    std::fprintf(stderr, "outcrop-base: %s\n", line);
+}
+
 int live(const std::string &file, bool is_check)
 {
     oc_base_config_t config;
-    char error[1024];
-    if (!oc_base_config_load(file.c_str(), &config, error, sizeof error)) throw std::runtime_error(error);
+    if (!oc_base_config_load(file.c_str(), &config, print_fault, nullptr)) return 1;
     if (is_check) {
         outcrop::OutputOptions output;
         output.path = config.path;
@@ -57,8 +61,11 @@ int main(int argc, char **argv)
 
     std::string config;
     CLI::App *live_command = app.add_subcommand("live", "listen to a vehicle, write the run's folder when settled");
-    live_command->add_option("--config", config, "YAML file; keys in docs/operating.md")->required();
-    bool is_check = false;
+    CLI::Option_group *what = live_command->add_option_group("what");
+    what->add_option("--config", config, "YAML configuration");
+    bool is_check = false, is_print = false;
+    what->add_flag("--print-config", is_print, "print a sample configuration: every key with unit, range, default");
+    what->require_option(1);
     live_command->add_flag("--check", is_check, "check the configuration, then exit");
 
     outcrop::ReplayOptions options;
@@ -85,6 +92,7 @@ int main(int argc, char **argv)
     }
     cv::setNumThreads(1); // sums in one order, whatever the machine
     try {
+        if (is_print) return oc_base_config_print_sample(stdout) ? 0 : 1;
         return *live_command ? live(config, is_check) : replay(options, area);
     } catch (const std::exception &fault) {
         std::fprintf(stderr, "outcrop-base: %s\n", fault.what());
