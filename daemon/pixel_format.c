@@ -33,6 +33,32 @@ size_t oc_pixel_format_bytes(oc_pixel_format_t format, uint32_t stride_bytes, ui
     return format == OC_PIXEL_NV12 ? luma + (size_t)stride_bytes * ((height_px + 1u) / 2u) : luma;
 }
 
+uint32_t oc_pixel_format_row_bytes(oc_pixel_format_t format, uint32_t width_px)
+{
+    switch (format) {
+    case OC_PIXEL_GREY: return width_px;
+    case OC_PIXEL_RGB: return 3u * width_px;
+    case OC_PIXEL_YUYV:
+    case OC_PIXEL_UYVY: return width_px % 2u == 0 ? 2u * width_px : 0;
+    case OC_PIXEL_NV12: return width_px + width_px % 2u;
+    case OC_PIXEL_MJPG: break;
+    }
+    return 0;
+}
+
+static bool is_side(uint32_t side_px)
+{
+    return side_px >= OC_MIN_IMAGE_SIDE && side_px <= OC_MAX_IMAGE_SIDE;
+}
+
+bool oc_raw_image_is_valid(const oc_raw_image_t *raw)
+{
+    if (!is_side(raw->width_px) || !is_side(raw->height_px)) return false;
+    const uint32_t row_bytes = oc_pixel_format_row_bytes(raw->format, raw->width_px);
+    if (row_bytes == 0 || raw->stride_bytes < row_bytes || !raw->px) return false;
+    return raw->format != OC_PIXEL_NV12 || raw->chroma;
+}
+
 uint32_t oc_pixel_format_channels(oc_pixel_format_t format)
 {
     return format == OC_PIXEL_GREY ? 1 : 3;

@@ -39,6 +39,14 @@ bool oc_pixel_format_from_name(const char *name, oc_pixel_format_t *format);
 /* Bytes of a whole frame with this stride; 0 for MJPG. */
 size_t oc_pixel_format_bytes(oc_pixel_format_t format, uint32_t stride_bytes, uint32_t height_px);
 
+/* The least stride of a row of this width. 0 where there is none: MJPG, width 0, and an odd width of
+ * YUYV or UYVY, whose pixels come in pairs. NV12 may be odd both ways; a row is then padded to a pair. */
+uint32_t oc_pixel_format_row_bytes(oc_pixel_format_t format, uint32_t width_px);
+
+/* What a source must see to before it hands pixels on: a size within OC_MIN_IMAGE_SIDE..OC_MAX_IMAGE_SIDE
+ * that the format can have, a stride of at least one row, and all planes there. */
+bool oc_raw_image_is_valid(const oc_raw_image_t *raw);
+
 /* Channels of what rectification makes of it: 1 for GREY, else 3. */
 uint32_t oc_pixel_format_channels(oc_pixel_format_t format);
 

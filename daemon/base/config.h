@@ -1,11 +1,15 @@
 /* SPDX-License-Identifier: BSD-3-Clause
- * outcrop-base's configuration file (YAML, checked against a schema). Keys: docs/operating.md. */
+ * outcrop-base's configuration file (YAML, checked against a schema and a table of keys).
+ * Every key with unit, range and default: docs/outcrop-base.yaml. */
 #ifndef OUTCROP_DAEMON_BASE_CONFIG_H
 #define OUTCROP_DAEMON_BASE_CONFIG_H
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
+
+#include "config_fault.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -29,8 +33,12 @@ typedef struct oc_base_config {
     bool exit_when_settled;
 } oc_base_config_t;
 
-/* Read and check a file; false and one line in error otherwise. */
-bool oc_base_config_load(const char *path, oc_base_config_t *config, char *error, size_t error_bytes);
+/* Read and check a file. Every fault goes to `on_fault`, in the order of lines;
+ * false when there was any, and config is then untouched. */
+bool oc_base_config_load(const char *path, oc_base_config_t *config, oc_config_fault_t on_fault, void *user);
+
+/* docs/outcrop-base.yaml, made from the table of keys. False when out cannot be written. */
+bool oc_base_config_print_sample(FILE *out);
 
 #ifdef __cplusplus
 }

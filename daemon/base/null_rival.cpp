@@ -80,6 +80,10 @@ void NullRival::decode(Keyframe *keyframe)
     const oc_raw_image_t raw = oc_raw_from_image(&image);
     const oc_lens_t lens = oc_lens_plumb_bob(&k, &keyframe->head.distortion);
     const oc_image_t flat = oc_rectify_apply(rectify.get(), &raw, &lens);
+    if (!flat.px) { // a lens that cannot be
+        keyframe->rgb.release();
+        return;
+    }
     cv::Mat3b copy(bgr.rows, bgr.cols);
     std::memcpy(copy.data, flat.px, copy.total() * 3);
     keyframe->rgb = copy;

@@ -122,7 +122,10 @@ std::map<int, std::uint32_t> Session::missing()
     const auto &status = assembler_.status();
     if (rival_) return rival_->missing(status, assembler_.announced());
     auto out = assembler_.missing();
-    if (!status || heard_.size() + assembler_.announced().size() < status->n_views) return out;
+    // A view that was held back is announced first and comes later.
+    std::size_t n_known = heard_.size();
+    for (const auto &[id, utime_us] : assembler_.announced()) n_known += heard_.count(id) == 0;
+    if (!status || n_known < status->n_views) return out;
     for (auto entry = out.begin(); entry != out.end();)
         entry = heard_.count(entry->first) ? std::next(entry) : out.erase(entry);
     return out;

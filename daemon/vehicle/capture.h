@@ -38,7 +38,7 @@ typedef enum oc_capture_result {
 } oc_capture_result_t;
 
 /* Descriptors that one source may want to be woken by. */
-#define OC_MAX_CAPTURE_FDS 8u
+#define OC_MAX_CAPTURE_FDS 12u
 
 typedef struct oc_capture oc_capture_t;
 struct oc_capture {

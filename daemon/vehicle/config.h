@@ -1,15 +1,17 @@
 /* SPDX-License-Identifier: BSD-3-Clause
- * outcropd's configuration file (YAML, checked against a schema). Every key
- * with unit, range and default: docs/outcropd.yaml. */
+ * outcropd's configuration file (YAML, checked against a schema and a table of
+ * keys). Every key with unit, range and default: docs/outcropd.yaml. */
 #ifndef OUTCROP_DAEMON_CONFIG_H
 #define OUTCROP_DAEMON_CONFIG_H
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 #include "camera_source.h"
 #include "capture.h"
+#include "config_fault.h"
 #include "gpio.h"
 #include "pose_lcm.h"
 #include "vehicle/vehicle.h"
@@ -43,18 +45,20 @@ typedef struct oc_config {
 
     oc_gpio_config_t gpio;
 
+    bool has_held_views;                    /* views are announced, and wait for a mark or a request */
     uint32_t pre_event_s;                   /* how far back a mark or a request reaches */
     char status_file[OC_CONFIG_TEXT_BYTES]; /* rewritten every second, for --status; "" = none */
     char debug_dump[OC_CONFIG_TEXT_BYTES];  /* folder for junctions.json, "" = none */
 
-    oc_vehicle_config_t vehicle; /* image size and area are filled from the source; hold_views from pre_event */
+    oc_vehicle_config_t vehicle; /* image size and, for a site, area are filled from the source */
 } oc_config_t;
-
-/* One fault of a configuration file: "FILE:LINE: key: what is wrong". */
-typedef void (*oc_config_fault_t)(void *user, const char *line);
 
 /* Read and check a file and the calibration files it names. Every fault goes to `on_fault`, in the order of
  * lines; false when there was any, and config is then untouched. */
 bool oc_config_load(const char *path, oc_config_t *config, oc_config_fault_t on_fault, void *user);
+
+/* docs/outcropd.yaml and docs/man/outcropd.yaml.5, made from the table of keys. False when out cannot be written. */
+bool oc_config_print_sample(FILE *out);
+bool oc_config_print_manual(FILE *out);
 
 #endif

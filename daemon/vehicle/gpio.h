@@ -49,8 +49,8 @@ bool oc_gpio_is_enabled(const oc_gpio_t *gpio);
  * faster than they are taken become one, the first, and are counted. */
 bool oc_gpio_take_mark(oc_gpio_t *gpio, int64_t *mono_ns);
 
-/* A frame exposed at mono_ns has come: per-frame trigger, strobe, heartbeat. Does not block. */
-void oc_gpio_frame(oc_gpio_t *gpio, int64_t mono_ns);
+/* A frame has come: per-frame trigger, strobe, heartbeat. Does not block. */
+void oc_gpio_frame(oc_gpio_t *gpio);
 
 /* Periodic trigger: the start of the pulse that belongs to a frame which came
  * at mono_ns, the last one before it within a period. False when there is none. */

@@ -10,6 +10,10 @@
 
 #include "core/camera.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Body: x forward, y left, z up. Position and orientation in the world. */
 typedef struct oc_body_pose {
     int64_t utime_us;
@@ -41,7 +45,7 @@ void oc_pose_track_clear(oc_pose_track_t *track);
 OC_CHECKED oc_status_t oc_pose_track_add(oc_pose_track_t *track, const oc_body_pose_t *pose);
 
 /* The pose at a time: position linear, rotation on the shorter arc, the
- * covariance that of the worse neighbour, element by element of its diagonal. */
+ * covariance that of the neighbour with the larger trace (when both have one). */
 oc_pose_answer_t oc_pose_track_at(oc_pose_track_t *track, int64_t utime_us, oc_body_pose_t *pose);
 
 /* The newest pose's time, INT64_MIN when there is none. */
@@ -57,10 +61,16 @@ oc_pose_t oc_mount_from_xyzrpy(const double xyz_m[3], const double rpy_rad[3]);
 /* cam_from_world of a camera on the body. */
 oc_pose_t oc_pose_of_camera(const oc_body_pose_t *body, const oc_pose_t *body_from_optical);
 
-/* Margins of the camera's pose: the body's one-sigma values times sqrt 3 (a
- * uniform error of that half-width has that sigma), the lever of the mount and
- * its turn of the axes included; half-widths not smaller than `least`. */
+/* Margins of the camera's pose: the body's covariance carried over to the
+ * camera's centre (the lever of the mount included) and to omega, phi, kappa,
+ * one sigma times sqrt 3 (a uniform error of that half-width has that sigma);
+ * not smaller than `least`, which is all there is without a covariance, and
+ * angles not larger than 45 degrees: where phi nears 90 degrees (a camera that
+ * looks level to the east or west) omega and kappa are hardly to be told apart. */
 oc_margin_t oc_margin_of_camera(const oc_body_pose_t *body, const oc_pose_t *body_from_optical,
                                 const oc_margin_t *least);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

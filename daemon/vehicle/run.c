@@ -125,7 +125,7 @@ static bool run_is_marked(vehicle_run_t *run, const oc_captured_t *captured)
     const bool is_marked =
         (run->forced_cameras & bit) != 0 || (run->config->source == OC_SOURCE_CAMERAS && captured->is_forced);
     run->forced_cameras &= ~bit;
-    if (is_marked && run->config->vehicle.hold_views)
+    if (is_marked && run->config->has_held_views)
         run_recall(run, captured->utime_us - (int64_t)run->config->pre_event_s * 1000000, captured->utime_us);
     return is_marked;
 }
@@ -172,7 +172,7 @@ static bool run_take_frame(vehicle_run_t *run)
     const oc_capture_result_t result = run->capture->next(run->capture, oc_mono_ns(), &captured, error, sizeof error);
     switch (result) {
     case OC_CAPTURE_NONE: return false;
-    case OC_CAPTURE_ERROR: fprintf(stderr, "outcropd: %s\n", error); return false;
+    case OC_CAPTURE_ERROR: fprintf(stderr, "outcropd: %s\n", error); return true;
     case OC_CAPTURE_DONE:
         run->is_source_done = true;
         run->next_status_ns = oc_mono_ns(); /* say so at once */

@@ -87,6 +87,7 @@ static bool run_open_vehicle(vehicle_run_t *run, char *error, size_t error_bytes
     vehicle.max_height_px = run->capture->max_height_px;
     if (run->capture->area.is_set) vehicle.area = run->capture->area;
     vehicle.keep_colour = has_colour(run->config);
+    vehicle.hold_views = run->config->has_held_views;
     const size_t n_bytes = oc_vehicle_size(&vehicle);
     if (n_bytes == 0) {
         snprintf(error, error_bytes, "the configuration is out of range");

@@ -29,7 +29,7 @@ typedef struct oc_video_wish {
     oc_pixel_format_t format;
     uint32_t width_px, height_px;
     double rate_hz;     /* 0: the driver's default */
-    uint32_t n_buffers; /* 3..16 */
+    uint32_t n_buffers; /* 4..16 */
     oc_video_controls_t controls;
 } oc_video_wish_t;
 

@@ -62,7 +62,8 @@ static bool type_is_known(uint32_t type)
     case OC_PACKET_IMAGE:
     case OC_PACKET_RESEND_REQUEST:
     case OC_PACKET_PATCH_REQUEST:
-    case OC_PACKET_OVERHEAD_REQUEST: return true;
+    case OC_PACKET_OVERHEAD_REQUEST:
+    case OC_PACKET_RECALL_REQUEST: return true;
     default: return false;
     }
 }

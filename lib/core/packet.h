@@ -235,12 +235,12 @@ typedef struct oc_area {
 
 typedef struct oc_vehicle_status {
     uint32_t uptime_s;
-    uint16_t n_views;     /* views and announcements given out so far */
-    uint16_t newest_view; /* valid when n_views > 0 */
-    bool is_source_done;  /* a site folder has been played to its end */
-    uint32_t bytes_sent;  /* packets, without LCM's overhead */
-    oc_area_t area;       /* float32 on the wire; the base falls back on it */
-    uint32_t counters[OC_N_COUNTERS];
+    uint16_t n_views;                 /* views and announcements given out so far */
+    uint16_t newest_view;             /* valid when n_views > 0 */
+    bool is_source_done;              /* a site folder has been played to its end */
+    uint32_t bytes_sent;              /* packets, without LCM's overhead */
+    oc_area_t area;                   /* float32 on the wire; the base falls back on it */
+    uint32_t counters[OC_N_COUNTERS]; /* stop at 2^30 - 1 on the wire */
 } oc_vehicle_status_t;
 
 /* ---- encoding: vehicle ----
@@ -288,6 +288,9 @@ OC_CHECKED oc_status_t oc_packet_encode_overhead_request(const oc_packet_head_t 
                                                          const oc_overhead_request_t *request, uint8_t *buf, size_t cap,
                                                          size_t *n_bytes, uint16_t *tiles_taken);
 
+OC_CHECKED oc_status_t oc_packet_encode_recall(const oc_packet_head_t *packet, const oc_recall_request_t *request,
+                                               uint8_t *buf, size_t cap, size_t *n_bytes);
+
 /* ---- decoding ----
  * head first (checks length, version, type, CRC), then the body by its type.
  * OC_E_FORMAT for anything that docs/protocol.md does not allow. */
@@ -303,6 +306,7 @@ OC_CHECKED oc_status_t oc_packet_decode_resend(const uint8_t *buf, size_t n_byte
 OC_CHECKED oc_status_t oc_packet_decode_patch_request(const uint8_t *buf, size_t n_bytes, oc_patch_request_t *request);
 OC_CHECKED oc_status_t oc_packet_decode_overhead_request(const uint8_t *buf, size_t n_bytes,
                                                          oc_overhead_request_t *request);
+OC_CHECKED oc_status_t oc_packet_decode_recall(const uint8_t *buf, size_t n_bytes, oc_recall_request_t *request);
 
 #ifdef __cplusplus
 }

@@ -185,3 +185,44 @@ oc_status_t oc_packet_decode_overhead_request(const uint8_t *buf, size_t n_bytes
     *request = result;
     return OC_OK;
 }
+
+/* ---- recall request ---- */
+
+oc_status_t oc_packet_encode_recall(const oc_packet_head_t *packet, const oc_recall_request_t *request, uint8_t *buf,
+                                    size_t cap, size_t *n_bytes)
+{
+    OC_ASSERT(packet && request && buf && n_bytes);
+    if (!request->is_relative && (!oc_packet_is_utime(request->from_us) || !oc_packet_is_utime(request->to_us) ||
+                                  request->from_us > request->to_us))
+        return OC_E_ARG;
+
+    oc_bit_writer_t writer;
+    oc_packet_begin(&writer, packet, OC_PACKET_RECALL_REQUEST, buf, cap);
+    oc_bits_put(&writer, request->is_relative ? 1 : 0, 1);
+    if (request->is_relative) {
+        oc_bits_put(&writer, request->last_ms, 32);
+    } else {
+        oc_packet_put_utime(&writer, request->from_us);
+        oc_packet_put_utime(&writer, request->to_us);
+    }
+    return oc_packet_end(&writer, n_bytes);
+}
+
+oc_status_t oc_packet_decode_recall(const uint8_t *buf, size_t n_bytes, oc_recall_request_t *request)
+{
+    OC_ASSERT(request);
+    oc_bit_reader_t reader;
+    const oc_status_t status = oc_packet_open(buf, n_bytes, OC_PACKET_RECALL_REQUEST, &reader);
+    if (status != OC_OK) return status;
+
+    oc_recall_request_t result = {.is_relative = oc_bits_get(&reader, 1) == 1};
+    if (result.is_relative) {
+        result.last_ms = oc_bits_get(&reader, 32);
+    } else {
+        result.from_us = oc_packet_get_utime(&reader);
+        result.to_us = oc_packet_get_utime(&reader);
+    }
+    if (oc_packet_close(&reader) != OC_OK || result.from_us > result.to_us) return OC_E_FORMAT;
+    *request = result;
+    return OC_OK;
+}

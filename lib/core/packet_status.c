@@ -106,9 +106,14 @@ const char *oc_counter_name(oc_counter_t counter)
     return (unsigned)counter < OC_N_COUNTERS ? names[counter] : "?";
 }
 
+/* Counters stop here, so that a status fits the smallest datagram whatever they are; a year of frames at 30 Hz does too. */
+#define COUNTER_BITS 30u
+#define COUNTER_MAX ((1u << COUNTER_BITS) - 1u)
+
 /* 1 bit for 0; else the number of significant bits less one in 5, and all but the highest of them. */
 static void counter_put(oc_bit_writer_t *writer, uint32_t count)
 {
+    if (count > COUNTER_MAX) count = COUNTER_MAX;
     oc_bits_put(writer, count > 0 ? 1 : 0, 1);
     if (count == 0) return;
     unsigned n = 0;
@@ -117,11 +122,15 @@ static void counter_put(oc_bit_writer_t *writer, uint32_t count)
     oc_bits_put(writer, count - (1u << n), n);
 }
 
-static uint32_t counter_get(oc_bit_reader_t *reader)
+/* False when the number of bits is one that nobody writes. */
+static bool counter_get(oc_bit_reader_t *reader, uint32_t *count)
 {
-    if (oc_bits_get(reader, 1) == 0) return 0;
+    *count = 0;
+    if (oc_bits_get(reader, 1) == 0) return true;
     const unsigned n = (unsigned)oc_bits_get(reader, 5);
-    return (1u << n) | (uint32_t)oc_bits_get(reader, n);
+    if (n >= COUNTER_BITS) return false;
+    *count = 1u << n | oc_bits_get(reader, n);
+    return true;
 }
 
 static bool area_is_sendable(const oc_area_t *area)
@@ -191,7 +200,7 @@ oc_status_t oc_packet_decode_status(const uint8_t *buf, size_t n_bytes, oc_vehic
     result.newest_view = (uint16_t)oc_bits_get(&reader, 16);
     result.bytes_sent = oc_bits_get(&reader, 32);
     for (int i = 0; i < OC_N_COUNTERS; i++) {
-        result.counters[i] = counter_get(&reader);
+        if (!counter_get(&reader, &result.counters[i])) return OC_E_FORMAT;
     }
     result.is_source_done = oc_bits_get(&reader, 1) == 1;
     if (area_get(&reader, &result.area) != OC_OK) return OC_E_FORMAT;

@@ -317,7 +317,8 @@ static void view_add(oc_vehicle_t *vehicle, const oc_frame_t *frame, uint32_t n_
 
     oc_vehicle_filter(vehicle, view);
     sending_choose(vehicle, view);
-    if (oc_vehicle_plan(vehicle, view) != OC_OK) oc_vehicle_add(vehicle, OC_COUNT_SEND_FAILED, 1);
+    const bool is_held = vehicle->config.hold_views && !frame->is_forced;
+    if (oc_vehicle_plan(vehicle, view, is_held) != OC_OK) oc_vehicle_add(vehicle, OC_COUNT_SEND_FAILED, 1);
 
     vehicle->next_view = (uint16_t)(head.view + 1u);
     vehicle->newest_view = head.view;

@@ -36,6 +36,7 @@ typedef struct oc_vehicle_config {
     uint32_t max_width_px; /* largest frame that will come */
     uint32_t max_height_px;
     uint32_t stored_views;       /* 2..256; each costs width * height * (channels stored) bytes */
+    bool hold_views;             /* announce views and keep them until they are recalled; forced ones go at once */
     bool keep_colour;            /* store RGB as well as grey, for the overhead and texture layers */
     uint32_t datagram_bytes;     /* OC_MIN_DATAGRAM_BYTES..OC_MAX_DATAGRAM_BYTES */
     uint32_t max_sent_junctions; /* per view, 1..OC_MAX_JUNCTIONS */
@@ -82,10 +83,16 @@ OC_CHECKED oc_status_t oc_vehicle_init(const oc_vehicle_config_t *config, void *
  * larger than configured or camera_index is not below OC_MAX_CAMERAS; then nothing has changed but the counters. */
 OC_CHECKED oc_status_t oc_vehicle_push(oc_vehicle_t *vehicle, const oc_frame_t *frame, oc_push_report_t *report);
 
-/* Take a packet of the base. Resend and patch requests are queued;
- * OC_E_STATE when what they ask for has left the ring, OC_E_SPACE when the
- * queue is full, OC_E_FORMAT when ill-formed (all counted). Overhead requests are not for this
- * function: decode them and use oc_vehicle_tile. */
+/* Set the stored views from from_us to to_us free: held ones are sent for the
+ * first time, others once more, newest first. *n: how many there are. OC_E_ARG
+ * when from_us > to_us. */
+OC_CHECKED oc_status_t oc_vehicle_recall(oc_vehicle_t *vehicle, int64_t from_us, int64_t to_us, uint32_t *n);
+
+/* Take a packet of the base. Resend and patch requests are queued; to ask for
+ * parts of a held view sets it free. OC_E_STATE when what they ask for has left
+ * the ring, OC_E_SPACE when the queue is full, OC_E_FORMAT when ill-formed (all
+ * counted). Not for overhead requests (decode them and use oc_vehicle_tile) nor
+ * for recall requests, which may mean "until now" (decode, and oc_vehicle_recall). */
 OC_CHECKED oc_status_t oc_vehicle_handle(oc_vehicle_t *vehicle, const uint8_t *packet, size_t n_bytes);
 
 /* The next datagram to send, or n_bytes = 0 when there is none. Order: view

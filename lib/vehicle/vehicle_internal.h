@@ -43,7 +43,8 @@ typedef struct stored_view {
     view_run_t runs[OC_MAX_VIEW_PARTS];
     uint8_t n_parts;
 
-    bool is_announced;                 /* nothing to send but that it exists */
+    bool is_held;                      /* its parts wait for a recall; it is announced meanwhile */
+    bool is_announced;                 /* nothing to send, or nothing yet, but that it exists */
     uint32_t unsent_parts;             /* bit i: part i has never left; bit 0 for an announcement */
     uint32_t again_parts;              /* asked for again */
     uint16_t relabel_from, relabel_to; /* transmit order; empty when equal */
@@ -94,9 +95,9 @@ bool oc_area_is_hit(const oc_area_t *area, const oc_camera_t *camera, const oc_m
                     double y_px);
 bool oc_area_is_valid(const oc_area_t *area);
 
-/* Fill the view's runs and its transmit order from order, sent_label and ties.
+/* Fill the view's runs and its transmit order from order, sent_label and ties; held when asked for.
  * Drops from the tail what OC_MAX_VIEW_PARTS packets do not hold. */
-OC_CHECKED oc_status_t oc_vehicle_plan(oc_vehicle_t *vehicle, stored_view_t *view);
+OC_CHECKED oc_status_t oc_vehicle_plan(oc_vehicle_t *vehicle, stored_view_t *view, bool is_held);
 
 /* Forget everything that waits on behalf of a view that leaves the ring. */
 void oc_vehicle_forget(oc_vehicle_t *vehicle, stored_view_t *view);

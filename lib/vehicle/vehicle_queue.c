@@ -51,7 +51,13 @@ static oc_status_t runs_make(oc_vehicle_t *vehicle, stored_view_t *view, view_ru
     return OC_OK;
 }
 
-oc_status_t oc_vehicle_plan(oc_vehicle_t *vehicle, stored_view_t *view)
+/* All of a view's parts, or its announcement. */
+static uint32_t all_parts(const stored_view_t *view)
+{
+    return view->is_announced ? 1u : (uint32_t)(((uint64_t)1 << view->n_parts) - 1u);
+}
+
+oc_status_t oc_vehicle_plan(oc_vehicle_t *vehicle, stored_view_t *view, bool is_held)
 {
     view->again_parts = 0;
     view->relabel_from = view->relabel_to = 0;
@@ -68,14 +74,42 @@ oc_status_t oc_vehicle_plan(oc_vehicle_t *vehicle, stored_view_t *view)
         status = OC_E_SPACE;
     }
     if (status != OC_OK) view->n_sent = view->n_ties = view->n_parts = 0;
-    view->is_announced = view->n_parts == 0;
-    view->unsent_parts = view->is_announced ? 1u : (uint32_t)(((uint64_t)1 << view->n_parts) - 1u);
+    view->is_held = is_held && view->n_parts > 0;
+    view->is_announced = view->is_held || view->n_parts == 0;
+    view->unsent_parts = all_parts(view);
     return status;
+}
+
+/* Labels that changed while it was held follow as a relabel. */
+static void set_free(oc_vehicle_t *vehicle, stored_view_t *view)
+{
+    view->is_held = view->is_announced = false;
+    view->unsent_parts = all_parts(view);
+    view->again_parts = 0;
+    oc_vehicle_add(vehicle, OC_COUNT_RECALLED, 1);
+}
+
+oc_status_t oc_vehicle_recall(oc_vehicle_t *vehicle, int64_t from_us, int64_t to_us, uint32_t *n)
+{
+    OC_ASSERT(vehicle && n);
+    if (from_us > to_us) return OC_E_ARG;
+    *n = 0;
+    for (uint32_t age = 0; age < vehicle->n_stored; age++) {
+        stored_view_t *view = oc_vehicle_by_age(vehicle, age);
+        if (view->head.utime_us < from_us || view->head.utime_us > to_us) continue;
+        if (view->is_held) {
+            set_free(vehicle, view);
+        } else {
+            view->again_parts |= all_parts(view) & ~view->unsent_parts;
+        }
+        ++*n;
+    }
+    return OC_OK;
 }
 
 void oc_vehicle_forget(oc_vehicle_t *vehicle, stored_view_t *view)
 {
-    if (view->unsent_parts != 0) oc_vehicle_add(vehicle, OC_COUNT_VIEWS_DROPPED, 1);
+    if (view->unsent_parts != 0 && !view->is_held) oc_vehicle_add(vehicle, OC_COUNT_VIEWS_DROPPED, 1);
     uint32_t n = 0;
     for (uint32_t i = 0; i < vehicle->n_patches; i++) {
         if (vehicle->patches[i].view == view->head.view) {
@@ -109,10 +143,12 @@ static oc_status_t handle_resend(oc_vehicle_t *vehicle, const oc_resend_request_
         oc_vehicle_add(vehicle, OC_COUNT_REQUESTS_GONE, 1);
         return OC_E_STATE;
     }
+    if (view->is_held) {
+        set_free(vehicle, view);
+        return OC_OK;
+    }
     /* The base cannot know how many parts there are: bits beyond the last mean nothing. */
-    const uint32_t n_parts = view->is_announced ? 1u : view->n_parts;
-    const uint32_t parts = request->parts & (uint32_t)(((uint64_t)1 << n_parts) - 1u);
-    view->again_parts |= parts & ~view->unsent_parts;
+    view->again_parts |= request->parts & all_parts(view) & ~view->unsent_parts;
     return OC_OK;
 }
 
@@ -261,7 +297,7 @@ static oc_status_t next_view(oc_vehicle_t *vehicle, bool is_again, uint8_t *buf,
         uint32_t *mask = is_again ? &view->again_parts : &view->unsent_parts;
         if (*mask == 0) continue;
         const oc_status_t status = next_part(vehicle, view, mask, is_again, buf, n_bytes);
-        if (!is_again && *mask == 0) oc_vehicle_add(vehicle, OC_COUNT_VIEWS_SENT, 1);
+        if (!is_again && *mask == 0 && !view->is_held) oc_vehicle_add(vehicle, OC_COUNT_VIEWS_SENT, 1);
         return status;
     }
     return OC_OK;
@@ -290,7 +326,7 @@ static oc_status_t next_relabel(oc_vehicle_t *vehicle, uint8_t *buf, size_t *n_b
 {
     for (uint32_t age = 0; age < vehicle->n_stored; age++) {
         stored_view_t *view = oc_vehicle_by_age(vehicle, age);
-        if (view->relabel_from == view->relabel_to) continue;
+        if (view->is_held || view->relabel_from == view->relabel_to) continue;
         return next_relabel_of(vehicle, view, buf, n_bytes);
     }
     return OC_OK;

@@ -63,6 +63,16 @@ def one_line(name, command, status, *parts):
         check(part in err, name, repr(part), "is not in", repr(err))
 
 
+def expect_lines(name, command, lead, *places):
+    """One line for each place, in that order, and status 1."""
+    code, _, err = run(command)
+    lines = err.splitlines()
+    check(code == 1, name, "exit status", code, err)
+    check(len(lines) == len(places), name, "tells", len(lines), "faults:", err)
+    for line, place in zip(lines, places):
+        check(line.startswith(lead[:-1] + place), name, repr(place), "is not told by", repr(line))
+
+
 class Setup:
     def __init__(self, bin_dir, site, scratch):
         self.outcropd, self.base = str(bin_dir / "outcropd"), str(bin_dir / "outcrop-base")
@@ -74,6 +84,9 @@ class Setup:
         path = self.scratch / "config.yaml"
         path.write_text(text)
         return str(path)
+
+    def scratch_config(self):
+        return str(self.scratch / "config.yaml")
 
     def vehicle(self, change):
         return [self.outcropd, "--check", "--config", self.file(yaml(changed(self.vehicle_keys, change)))]
@@ -101,24 +114,34 @@ def check_vehicle_config(s):
     code, out, err = run(s.vehicle({}))
     check(code == 0 and not err and out.startswith("outcropd: 8 frames of at most 640x480"), out, err)
     faults = [
-        ({"vehicle": "256"}, "vehicle: 256 is not within 0..255"), ({"vehicle": "-1"}, ":1:", "vehicle"),
-        ({"vehicle": "one"}, ":1: vehicle: ", "'one'"), ({"vehicle": "[1]"}, ":1: vehicle: "),
-        ({"colour": "red"}, "Unexpected key: colour"), ({"link.bogus": "1"}, "Unexpected key: bogus"),
-        ({"link.up_url": None}, "up_url"), ({"link": None}, "link"), ({"source": None}, "source"),
-        ({"source.site": '""'}, "site"), ({"stored_views": "1"}, "stored_views: 1 is not within 2..256"),
-        ({"link.datagram_bytes": "199"}, "link.datagram_bytes: 199 is not within 200..1380"),
-        ({"link.datagram_bytes": "1381"}, "link.datagram_bytes"), ({"link.rate_kbit_s": "0"}, "link.rate_kbit_s"),
-        ({"link.quality": "101"}, "link.quality"), ({"link.send": "smoke"}, 'link.send: "smoke"'),
-        ({"link.codec": "gif"}, 'link.codec: "gif"'), ({"source.period_ms": "3600001"}, "source.period_ms"),
-        ({"margins": {"position_m": "-0.1"}}, "margins.position_m"), ({"margins": {"angle_deg": "46"}}, "margins.angle_deg"),
-        ({"margins": {"position_m": ".nan"}}, ": position_m: "), ({"margins": {"position_m": "nan"}}, "margins.position_m"),
-        ({"margins": {"angle_deg": "wide"}}, "angle_deg"), ({"junctions": {"sigma_px": "0.1"}}, "junctions.sigma_px"),
-        ({"junctions": {"lambda_px": "5"}}, "junctions.lambda_px"), ({"junctions": {"max_sent": "0"}}, "junctions.max_sent"),
-        ({"junctions": {"max_corners": "1025"}}, "junctions.max_corners"),
-        ({"junctions": {"method": "worst"}}, "junctions.method"), ({"junctions": {"t_b": "inf"}}, "junctions.t_b"),
+        ({"vehicle": "256"}, ":1: vehicle: 256 is not within 0..255"),
+        ({"vehicle": "-1"}, ":1: vehicle: -1 is not within 0..255"),
+        ({"vehicle": "one"}, ':1: vehicle: "one" is not a whole number'), ({"vehicle": "[1]"}, ":1: vehicle: must be one value"),
+        ({"colour": "red"}, ":7: colour: is no key here"), ({"link.bogus": "1"}, ":5: link.bogus: is no key here"),
+        ({"link.qualty": "1"}, "link.qualty: is no key here: did you mean quality?"),
+        ({"link.up_url": None}, ":2: link.up_url: is missing"), ({"link": None}, ":1: link: is missing"),
+        ({"source": None}, ":1: source: is missing, and so is cameras"), ({"source.site": '""'}, ":6: source.site: is empty"),
+        ({"stored_views": "1"}, ":7: stored_views: 1 is not within 2..256"),
+        ({"link.datagram_bytes": "199"}, ":5: link.datagram_bytes: 199 is not within 200..1380"),
+        ({"link.datagram_bytes": "1381"}, "link.datagram_bytes: 1381 is"), ({"link.rate_kbit_s": "0"}, "link.rate_kbit_s: 0 is"),
+        ({"link.quality": "101"}, "link.quality: 101 is"), ({"link.send": "smoke"}, 'link.send: "smoke" is not one of'),
+        ({"link.codec": "gif"}, 'link.codec: "gif" is not one of'), ({"source.period_ms": "3600001"}, "source.period_ms: 3600001 is"),
+        ({"margins": {"position_m": "-0.1"}}, ":8: margins.position_m: -0.1 is"),
+        ({"margins": {"angle_deg": "46"}}, ":8: margins.angle_deg: 46 is"),
+        ({"margins": {"position_m": ".nan"}}, 'margins.position_m: ".nan" is not finite'),
+        ({"margins": {"position_m": "nan"}}, 'margins.position_m: "nan" is not finite'),
+        ({"margins": {"angle_deg": "wide"}}, 'margins.angle_deg: "wide" is not a number'),
+        ({"junctions": {"sigma_px": "0.1"}}, ":8: junctions.sigma_px: 0.1 is"),
+        ({"junctions": {"lambda_px": "5"}}, "junctions.lambda_px: 5 is"), ({"junctions": {"max_sent": "0"}}, "junctions.max_sent: 0 is"),
+        ({"junctions": {"max_corners": "1025"}}, "junctions.max_corners: 1025 is"),
+        ({"junctions": {"method": "worst"}}, 'junctions.method: "worst" is'), ({"junctions": {"t_b": "inf"}}, 'junctions.t_b: "inf" is'),
     ]
     for change, *parts in faults:
         one_line(f"outcropd with {change}", s.vehicle(change), 1, f"outcropd: {s.scratch}/config.yaml:", *parts)
+    expect_lines("outcropd with many faults", s.vehicle({"vehicle": "one", "link.up_url": "up", "link.send": "smoke",
+                                                         "source.sight": "x", "junctions": {"t_b": "0.1"}}),
+                 "outcropd: " + s.scratch_config() + ":", ":1: vehicle: ", ":4: link.up_url: ", ":5: link.send: ",
+                 ":8: source.sight: ", ":10: junctions.t_b: ")
     one_line("no site", s.vehicle({"source.site": '"/nowhere/at/all"'}), 1, "outcropd: /nowhere/at/all")
 
 
@@ -126,17 +149,29 @@ def check_base_config(s):
     code, _, err = run(s.live({}))
     check(code == 0 and not err, err)
     faults = [
-        ({"vehicle": "256"}, "vehicle: 256 is not within 0..255"), ({"patch_quality": "32"}, "patch_quality"),
-        ({"patch_quality": "0"}, "patch_quality"), ({"datagram_bytes": "100"}, "datagram_bytes: 100 is not within"),
-        ({"as": "clouds"}, 'as: "clouds"'), ({"method": "worst"}, 'method: "worst"'), ({"out": None}, "out"),
-        ({"area": "[0, 1, 0, 1]"}, "area"), ({"area": "[0, 1, 0, 1, 0]"}, "area: must be"),
-        ({"area": "[1, 0, 0, 1, 1]"}, "area: must be"), ({"area": "[nan, 1, 0, 1, 1]"}, "area: must be"),
-        ({"area": "[0, 1e9, 0, 1, 1]"}, "area: must be"), ({"exit_when_settled": "perhaps"}, "exit_when_settled"),
-        ({"bogus": "1"}, "Unexpected key: bogus"), ({"up_url": "[]"}, "up_url"),
+        ({"vehicle": "256"}, ":4: vehicle: 256 is not within 0..255"), ({"patch_quality": "32"}, ":4: patch_quality: 32 is"),
+        ({"patch_quality": "0"}, "patch_quality: 0 is"), ({"datagram_bytes": "100"}, "datagram_bytes: 100 is not within"),
+        ({"as": "clouds"}, ':4: as: "clouds" is'), ({"method": "worst"}, 'method: "worst" is'), ({"out": None}, ":1: out: is missing"),
+        ({"area": "[0, 1, 0, 1]"}, ":4: area: has 4 items, not 5"), ({"area": "[0, 1, 0, 1, 0]"}, ":4: area: must be"),
+        ({"area": "[1, 0, 0, 1, 1]"}, "area: must be"), ({"area": "[nan, 1, 0, 1, 1]"}, ':4: area[0]: "nan" is not finite'),
+        ({"area": "[0, 1e9, 0, 1, 1]"}, ":4: area[1]: 1e9 is not within"),
+        ({"exit_when_settled": "perhaps"}, 'exit_when_settled: "perhaps" is not one of false, true'),
+        ({"bogus": "1"}, ":4: bogus: is no key here"), ({"up_url": "[]"}, ":2: up_url: must be one value"),
     ]
     for change, *parts in faults:
         one_line(f"outcrop-base with {change}", s.live(change), 1, f"outcrop-base: {s.scratch}/config.yaml:", *parts)
+    expect_lines("outcrop-base with many faults", s.live({"out": None, "up_url": "up", "as": "clouds", "bogus": "1"}),
+                 "outcrop-base: " + s.scratch_config() + ":", ":1: out: is missing", ":2: up_url: ", ":3: as: ", ":4: bogus: ")
     one_line("no path file", s.live({"path": '"/nowhere.json"'}), 1, "/nowhere.json")
+
+
+def check_samples(s, root):
+    """--print-config prints a file that the program takes, from the project's root."""
+    for program, kept in ([s.outcropd], "outcropd.yaml"), ([s.base, "live"], "outcrop-base.yaml"):
+        code, out, err = run(program + ["--print-config"])
+        check(code == 0 and not err and out == (root / "docs" / kept).read_text(), program, err)
+        done = subprocess.run(program + ["--check", "--config", s.file(out)], cwd=root, capture_output=True, text=True)
+        check(done.returncode == 0 and not done.stderr, program, done.stderr)
 
 
 def check_files_that_are_no_yaml(s):
@@ -222,6 +257,7 @@ def main():
         check_usage(setup)
         check_vehicle_config(setup)
         check_base_config(setup)
+        check_samples(setup, options.sites.resolve().parent.parent.parent)
         check_files_that_are_no_yaml(setup)
         check_replay_faults(setup)
         if have_namespaces():

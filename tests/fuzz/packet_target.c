@@ -203,6 +203,8 @@ static void same_bytes_again(const oc_packet_head_t *packet, const uint8_t *buf,
         status = oc_packet_encode_status(packet, &body.status, out, sizeof out, &n_out);
     } else if (packet->type == OC_PACKET_RESEND_REQUEST) {
         status = oc_packet_encode_resend(packet, &body.resend, out, sizeof out, &n_out);
+    } else if (packet->type == OC_PACKET_RECALL_REQUEST) {
+        status = oc_packet_encode_recall(packet, &body.recall, out, sizeof out, &n_out);
     } else if (packet->type == OC_PACKET_IMAGE) {
         status = oc_packet_encode_image(packet, &body.image, out, sizeof out, &n_out, &taken);
         /* Margins alike may come as one or as three. */

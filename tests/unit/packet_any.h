@@ -16,6 +16,7 @@ typedef union any_body {
     oc_resend_request_t resend;
     oc_patch_request_t patch_request;
     oc_overhead_request_t overhead_request;
+    oc_recall_request_t recall;
 } any_body_t;
 
 static inline oc_status_t any_decode_as(unsigned type, const uint8_t *buf, size_t n_bytes, any_body_t *body)
@@ -31,6 +32,7 @@ static inline oc_status_t any_decode_as(unsigned type, const uint8_t *buf, size_
     case OC_PACKET_RESEND_REQUEST: return oc_packet_decode_resend(buf, n_bytes, &body->resend);
     case OC_PACKET_PATCH_REQUEST: return oc_packet_decode_patch_request(buf, n_bytes, &body->patch_request);
     case OC_PACKET_OVERHEAD_REQUEST: return oc_packet_decode_overhead_request(buf, n_bytes, &body->overhead_request);
+    case OC_PACKET_RECALL_REQUEST: return oc_packet_decode_recall(buf, n_bytes, &body->recall);
     default: return OC_E_FORMAT;
     }
 }

@@ -8,7 +8,7 @@
 
 #include "core/packet.h"
 
-#define N_EXAMPLES 14
+#define N_EXAMPLES 15
 
 typedef struct example_packet {
     const char *name;
@@ -201,9 +201,10 @@ static inline int example_packets(example_packet_t packets[N_EXAMPLES])
     const oc_packet_head_t head = {.vehicle = 2, .sequence = 0x1234};
     const oc_announce_t announce = {.view = 8, .utime_us = 1700000000000001};
     const oc_resend_request_t resend = {.view = 8, .parts = 5};
+    const oc_recall_request_t recall = {.from_us = 1700000000000001, .to_us = 1700000030000000};
     static const char *const names[N_EXAMPLES] = {
-        "view_200", "view_mixed", "view_empty", "view_ties", "patch_coarse", "patch_fine",    "relabel",
-        "overhead", "status",     "announce",   "image",     "resend",       "patch_request", "overhead_request"};
+        "view_200", "view_mixed", "view_empty", "view_ties", "patch_coarse",  "patch_fine",       "relabel", "overhead",
+        "status",   "announce",   "image",      "resend",    "patch_request", "overhead_request", "recall"};
     int n = 0;
     n += example_view(&head, 1, 200, 2, 0, false, &packets[0]) == OC_OK;
     n += example_view(&head, 2, 60, 6, 12, true, &packets[1]) == OC_OK;
@@ -221,6 +222,8 @@ static inline int example_packets(example_packet_t packets[N_EXAMPLES])
          OC_OK;
     n += example_patch_request(&head, &packets[12]) == OC_OK;
     n += example_overhead_request(&head, &packets[13]) == OC_OK;
+    n += oc_packet_encode_recall(&head, &recall, packets[14].bytes, OC_MAX_DATAGRAM_BYTES, &packets[14].n_bytes) ==
+         OC_OK;
     for (int i = 0; i < N_EXAMPLES; i++) {
         packets[i].name = names[i];
     }

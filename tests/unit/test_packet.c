@@ -462,28 +462,6 @@ static void overhead_tiles_come_back(void)
     TEST_ASSERT_EQUAL(OC_E_ARG, oc_packet_encode_overhead(&sender, &sent, buf, sizeof buf, &n_bytes));
 }
 
-static void announcements_and_status_are_small_and_come_back(void)
-{
-    const oc_announce_t announce = {.view = 65535, .utime_us = ((int64_t)1 << 56) - 1};
-    oc_announce_t announce_back;
-    TEST_ASSERT_EQUAL(OC_OK, oc_packet_encode_announce(&sender, &announce, buf, sizeof buf, &n_bytes));
-    TEST_ASSERT_TRUE(n_bytes <= 24);
-    TEST_ASSERT_EQUAL(OC_OK, oc_packet_decode_announce(buf, n_bytes, &announce_back));
-    TEST_ASSERT_TRUE(announce_back.view == 65535 && announce_back.utime_us == announce.utime_us);
-
-    oc_vehicle_status_t status = {.uptime_s = UINT32_MAX, .n_views = 3, .newest_view = 2, .bytes_sent = 77};
-    oc_vehicle_status_t status_back;
-    status.counters[OC_COUNT_SEND_FAILED] = UINT32_MAX;
-    status.counters[OC_COUNT_FRAMES_IN] = 1;
-    TEST_ASSERT_EQUAL(OC_OK, oc_packet_encode_status(&sender, &status, buf, sizeof buf, &n_bytes));
-    TEST_ASSERT_TRUE(n_bytes <= 100);
-    TEST_ASSERT_EQUAL(OC_OK, oc_packet_decode_status(buf, n_bytes, &status_back));
-    TEST_ASSERT_TRUE(status_back.uptime_s == UINT32_MAX && status_back.n_views == 3 && status_back.newest_view == 2);
-    TEST_ASSERT_TRUE(status_back.bytes_sent == 77 && !status_back.is_source_done);
-    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, status_back.counters[OC_COUNT_SEND_FAILED]);
-    TEST_ASSERT_EQUAL_UINT32(1, status_back.counters[OC_COUNT_FRAMES_IN]);
-}
-
 static void requests_come_back(void)
 {
     const oc_resend_request_t resend = {.view = 8, .parts = 0x80000001u};
@@ -554,7 +532,6 @@ int main(void)
     RUN_TEST(relabels_come_back);
     RUN_TEST(image_pieces_reassemble);
     RUN_TEST(overhead_tiles_come_back);
-    RUN_TEST(announcements_and_status_are_small_and_come_back);
     RUN_TEST(requests_come_back);
     RUN_TEST(overhead_requests_come_back);
     return UNITY_END();

@@ -30,7 +30,9 @@ include(${LCM_USE_FILE})
 
 # ---- the vehicle's
 pkg_check_modules(GPIOD REQUIRED IMPORTED_TARGET GLOBAL libgpiod)
+pkg_check_modules(SYSTEMD REQUIRED IMPORTED_TARGET GLOBAL libsystemd)
 pkg_check_modules(CYAML REQUIRED IMPORTED_TARGET GLOBAL libcyaml)
+pkg_check_modules(YAML REQUIRED IMPORTED_TARGET GLOBAL yaml-0.1)
 pkg_check_modules(JANSSON REQUIRED IMPORTED_TARGET GLOBAL jansson)
 find_package(JPEG REQUIRED)
 pkg_check_modules(WEBP REQUIRED IMPORTED_TARGET GLOBAL libwebp)

@@ -1,0 +1,137 @@
+/* SPDX-License-Identifier: BSD-3-Clause
+ * The thread that opens and closes cameras. */
+#include "camera_opener.h"
+
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+typedef enum order_state { ORDER_NONE, ORDER_GIVEN, ORDER_UNDER_WAY, ORDER_DONE } order_state_t;
+
+typedef struct order {
+    order_state_t state;
+    oc_video_t *video; /* to be closed */
+    const oc_video_wish_t *wish;
+    oc_opened_t opened;
+} order_t;
+
+struct oc_camera_opener {
+    const oc_video_ops_t *ops;
+    pthread_t thread;
+    pthread_mutex_t lock;
+    pthread_cond_t given;
+    bool is_stopped;
+    int done_fd;
+    order_t orders[OC_MAX_CAMERAS];
+};
+
+static order_t *next_order(oc_camera_opener_t *opener)
+{
+    for (uint32_t i = 0; i < OC_MAX_CAMERAS; i++) {
+        if (opener->orders[i].state == ORDER_GIVEN) return &opener->orders[i];
+    }
+    return NULL;
+}
+
+static void carry_out(const oc_video_ops_t *ops, order_t *order)
+{
+    memset(&order->opened, 0, sizeof order->opened);
+    if (order->video) {
+        ops->close(order->video);
+    } else {
+        order->opened.video =
+            ops->open(order->wish, &order->opened.mode, order->opened.error, sizeof order->opened.error);
+    }
+}
+
+static void *thread_main(void *user)
+{
+    oc_camera_opener_t *opener = user;
+    const uint64_t one = 1;
+    pthread_mutex_lock(&opener->lock);
+    while (!opener->is_stopped) {
+        order_t *order = next_order(opener);
+        if (!order) {
+            pthread_cond_wait(&opener->given, &opener->lock);
+            continue;
+        }
+        order->state = ORDER_UNDER_WAY;
+        pthread_mutex_unlock(&opener->lock);
+        carry_out(opener->ops, order);
+        pthread_mutex_lock(&opener->lock);
+        order->state = ORDER_DONE;
+        if (write(opener->done_fd, &one, sizeof one) < 0) continue; /* readable already */
+    }
+    pthread_mutex_unlock(&opener->lock);
+    return NULL;
+}
+
+oc_camera_opener_t *oc_camera_opener_create(const oc_video_ops_t *ops)
+{
+    oc_camera_opener_t *opener = calloc(1, sizeof *opener);
+    if (!opener) return NULL;
+    opener->ops = ops;
+    opener->done_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    pthread_mutex_init(&opener->lock, NULL);
+    pthread_cond_init(&opener->given, NULL);
+    if (opener->done_fd >= 0 && pthread_create(&opener->thread, NULL, thread_main, opener) == 0) return opener;
+    if (opener->done_fd >= 0) close(opener->done_fd);
+    free(opener);
+    return NULL;
+}
+
+void oc_camera_opener_destroy(oc_camera_opener_t *opener)
+{
+    if (!opener) return;
+    pthread_mutex_lock(&opener->lock);
+    opener->is_stopped = true;
+    pthread_cond_signal(&opener->given);
+    pthread_mutex_unlock(&opener->lock);
+    pthread_join(opener->thread, NULL);
+    for (uint32_t i = 0; i < OC_MAX_CAMERAS; i++) {
+        order_t *order = &opener->orders[i];
+        if (order->state == ORDER_GIVEN && order->video) opener->ops->close(order->video);
+        if (order->state == ORDER_DONE && order->opened.video) opener->ops->close(order->opened.video);
+    }
+    close(opener->done_fd);
+    pthread_cond_destroy(&opener->given);
+    pthread_mutex_destroy(&opener->lock);
+    free(opener);
+}
+
+void oc_camera_opener_order(oc_camera_opener_t *opener, uint32_t camera, oc_video_t *video, const oc_video_wish_t *wish)
+{
+    pthread_mutex_lock(&opener->lock);
+    order_t *order = &opener->orders[camera];
+    order->state = ORDER_GIVEN;
+    order->video = video;
+    order->wish = wish;
+    pthread_cond_signal(&opener->given);
+    pthread_mutex_unlock(&opener->lock);
+}
+
+bool oc_camera_opener_collect(oc_camera_opener_t *opener, uint32_t camera, oc_opened_t *opened)
+{
+    pthread_mutex_lock(&opener->lock);
+    order_t *order = &opener->orders[camera];
+    const bool is_done = order->state == ORDER_DONE;
+    if (is_done) {
+        *opened = order->opened;
+        order->state = ORDER_NONE;
+    }
+    pthread_mutex_unlock(&opener->lock);
+    return is_done;
+}
+
+int oc_camera_opener_fd(const oc_camera_opener_t *opener)
+{
+    return opener->done_fd;
+}
+
+void oc_camera_opener_clear(oc_camera_opener_t *opener)
+{
+    uint64_t n;
+    if (read(opener->done_fd, &n, sizeof n) < 0) return; /* nothing to clear */
+}

@@ -1,0 +1,191 @@
+/* SPDX-License-Identifier: BSD-3-Clause
+ * A ring of poses that two threads share. */
+#include "pose_track.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+struct oc_pose_track {
+    pthread_mutex_t lock;
+    int added_fd;
+    int64_t max_gap_us;
+    uint32_t capacity, first, n;
+    oc_body_pose_t *ring;
+};
+
+oc_pose_track_t *oc_pose_track_create(uint32_t n, int64_t max_gap_us)
+{
+    oc_pose_track_t *track = calloc(1, sizeof *track);
+    if (!track) return NULL;
+    track->capacity = n;
+    track->max_gap_us = max_gap_us;
+    track->ring = malloc(n * sizeof *track->ring);
+    track->added_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    pthread_mutex_init(&track->lock, NULL);
+    if (track->ring && track->added_fd >= 0) {
+        memset(track->ring, 0xff, n * sizeof *track->ring); /* so that its pages are there from the start */
+        return track;
+    }
+    oc_pose_track_destroy(track);
+    return NULL;
+}
+
+void oc_pose_track_destroy(oc_pose_track_t *track)
+{
+    if (!track) return;
+    if (track->added_fd >= 0) close(track->added_fd);
+    pthread_mutex_destroy(&track->lock);
+    free(track->ring);
+    free(track);
+}
+
+int oc_pose_track_fd(const oc_pose_track_t *track)
+{
+    return track->added_fd;
+}
+
+void oc_pose_track_clear(oc_pose_track_t *track)
+{
+    uint64_t n;
+    if (read(track->added_fd, &n, sizeof n) < 0) return; /* nothing to clear */
+}
+
+/* ---- adding ---- */
+
+/* Symmetric and, by Cholesky with some slack for rounding, without a negative direction. */
+static bool is_covariance(const double c[36])
+{
+    double l[36] = {0}, largest = 0;
+    for (int i = 0; i < 36; i++) {
+        if (!isfinite(c[i])) return false;
+        largest = fmax(largest, fabs(c[i]));
+    }
+    const double slack = 1e-9 * largest;
+    for (int i = 0; i < 6; i++) {
+        for (int j = 0; j <= i; j++) {
+            if (fabs(c[6 * i + j] - c[6 * j + i]) > slack) return false;
+            double sum = c[6 * i + j];
+            for (int k = 0; k < j; k++) sum -= l[6 * i + k] * l[6 * j + k];
+            if (i == j) {
+                if (sum < -slack) return false;
+                l[6 * i + i] = sum > slack ? sqrt(sum) : 0;
+            } else if (l[6 * j + j] > 0) {
+                l[6 * i + j] = sum / l[6 * j + j];
+            } else if (fabs(sum) > 1e-4 * largest) { /* correlated with what does not vary */
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+static bool is_pose(const oc_body_pose_t *pose)
+{
+    double norm = 0;
+    for (int i = 0; i < 3; i++) {
+        if (!isfinite(pose->position_m[i])) return false;
+    }
+    for (int i = 0; i < 4; i++) norm += pose->q_wxyz[i] * pose->q_wxyz[i];
+    if (!(fabs(sqrt(norm) - 1) <= 1e-3)) return false;
+    return !pose->has_covariance || is_covariance(pose->covariance);
+}
+
+static oc_body_pose_t *nth(const oc_pose_track_t *track, uint32_t i)
+{
+    return &track->ring[(track->first + i) % track->capacity];
+}
+
+oc_status_t oc_pose_track_add(oc_pose_track_t *track, const oc_body_pose_t *pose)
+{
+    if (!is_pose(pose)) return OC_E_ARG;
+    pthread_mutex_lock(&track->lock);
+    const bool is_newer = track->n == 0 || pose->utime_us > nth(track, track->n - 1u)->utime_us;
+    if (is_newer) {
+        if (track->n == track->capacity) {
+            track->first = (track->first + 1u) % track->capacity;
+            track->n--;
+        }
+        *nth(track, track->n++) = *pose;
+    }
+    pthread_mutex_unlock(&track->lock);
+    const uint64_t one = 1;
+    if (is_newer && write(track->added_fd, &one, sizeof one) < 0) return OC_OK; /* readable already */
+    return is_newer ? OC_OK : OC_E_STATE;
+}
+
+/* ---- asking ---- */
+
+static void slerp(const double a[4], const double b[4], double share, double out[4])
+{
+    double dot = 0, norm = 0;
+    for (int i = 0; i < 4; i++) dot += a[i] * b[i];
+    const double sign = dot < 0 ? -1 : 1, angle = acos(fmin(1, fabs(dot)));
+    double wa = 1 - share, wb = share;
+    if (angle > 1e-4) {
+        wa = sin((1 - share) * angle) / sin(angle);
+        wb = sin(share * angle) / sin(angle);
+    }
+    for (int i = 0; i < 4; i++) {
+        out[i] = wa * a[i] + sign * wb * b[i];
+        norm += out[i] * out[i];
+    }
+    for (int i = 0; i < 4; i++) out[i] /= sqrt(norm);
+}
+
+static double trace_of(const double c[36])
+{
+    double sum = 0;
+    for (int i = 0; i < 6; i++) sum += c[7 * i];
+    return sum;
+}
+
+static void interpolate(const oc_body_pose_t *a, const oc_body_pose_t *b, int64_t utime_us, oc_body_pose_t *out)
+{
+    const double share = (double)(utime_us - a->utime_us) / (double)(b->utime_us - a->utime_us);
+    *out = a->has_covariance && b->has_covariance && trace_of(b->covariance) > trace_of(a->covariance) ? *b : *a;
+    out->utime_us = utime_us;
+    out->has_covariance = a->has_covariance && b->has_covariance;
+    for (int i = 0; i < 3; i++) out->position_m[i] = a->position_m[i] + share * (b->position_m[i] - a->position_m[i]);
+    slerp(a->q_wxyz, b->q_wxyz, share, out->q_wxyz);
+}
+
+static oc_pose_answer_t answer(const oc_pose_track_t *track, int64_t utime_us, oc_body_pose_t *pose)
+{
+    if (track->n == 0 || utime_us > nth(track, track->n - 1u)->utime_us) return OC_POSE_NOT_YET;
+    if (utime_us < nth(track, 0)->utime_us) return OC_POSE_NEVER;
+    /* The last pose that is not later: low is not later, high is later or past the end. */
+    uint32_t low = 0, high = track->n;
+    while (high - low > 1) {
+        const uint32_t middle = low + (high - low) / 2u;
+        *(nth(track, middle)->utime_us <= utime_us ? &low : &high) = middle;
+    }
+    const oc_body_pose_t *a = nth(track, low);
+    if (a->utime_us == utime_us) {
+        *pose = *a;
+        return OC_POSE_OK;
+    }
+    const oc_body_pose_t *b = nth(track, high);
+    if (b->utime_us - a->utime_us > track->max_gap_us) return OC_POSE_NEVER;
+    interpolate(a, b, utime_us, pose);
+    return OC_POSE_OK;
+}
+
+oc_pose_answer_t oc_pose_track_at(oc_pose_track_t *track, int64_t utime_us, oc_body_pose_t *pose)
+{
+    pthread_mutex_lock(&track->lock);
+    const oc_pose_answer_t result = answer(track, utime_us, pose);
+    pthread_mutex_unlock(&track->lock);
+    return result;
+}
+
+int64_t oc_pose_track_newest_us(oc_pose_track_t *track)
+{
+    pthread_mutex_lock(&track->lock);
+    const int64_t newest_us = track->n > 0 ? nth(track, track->n - 1u)->utime_us : INT64_MIN;
+    pthread_mutex_unlock(&track->lock);
+    return newest_us;
+}
