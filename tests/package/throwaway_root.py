@@ -74,7 +74,7 @@ class Root:
     def run(self, *command):
         done = self.call(*command)
         if done.returncode != 0:
-            sys.exit(f"{' '.join(command)}: status {done.returncode}: {done.stdout}{done.stderr}")
+            sys.exit(f"{' '.join(command)}: status {done.returncode}: {(done.stdout + done.stderr).strip()}")
         return done.stdout.strip()
 
     def dpkg(self, *arguments):
