@@ -183,6 +183,16 @@ static inline void fake_add(int camera, fake_event_t event)
     pthread_mutex_unlock(&fake_lock);
 }
 
+/* Open, and nothing waits that the source has not taken. */
+static inline bool fake_is_open(int camera, uint32_t n_opened, uint32_t max_events)
+{
+    pthread_mutex_lock(&fake_lock);
+    const fake_device_t *device = &fake_devices[camera];
+    const bool is_open = device->is_open && device->n_opened == n_opened && device->n_events <= max_events;
+    pthread_mutex_unlock(&fake_lock);
+    return is_open;
+}
+
 /* Buffers that the source has. */
 static inline uint32_t fake_n_held(int camera)
 {

@@ -476,15 +476,14 @@ static void every_frame_is_handed_out_or_counted(void)
             if (rand() % 40 == 0) posed_ns += 1200 * MS; /* farther apart than poses may be */
             add_pose(posed_ns);
         }
-        if (count(OC_COUNT_CAMERA_OPENED) == fake_devices[0].n_opened && fake_devices[0].is_open &&
-            fake_devices[0].n_events < 8) {
+        if (fake_is_open(0, count(OC_COUNT_CAMERA_OPENED), 7)) {
             fake_event_t event = good(0, now_ns - rand() % 30 * MS);
             event.is_flagged = rand() % 20 == 0;
             if (rand() % 20 == 0) event.n_bytes = (size_t)rand() % whole();
             fake_add(0, event);
             n_given++;
         }
-        if (rand() % 500 == 0 && fake_devices[0].is_open) {
+        if (rand() % 500 == 0 && fake_is_open(0, count(OC_COUNT_CAMERA_OPENED), 7)) {
             /* Frames before it are taken in, and those that wait then go with the camera. */
             pthread_mutex_lock(&fake_lock);
             n_given -= fake_devices[0].n_events;
