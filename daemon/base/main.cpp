@@ -10,6 +10,7 @@
 
 #include "config.h"
 #include "live.h"
+#include "recall.h"
 #include "replay.h"
 
 namespace {
@@ -51,6 +52,57 @@ int replay(outcrop::ReplayOptions options, const std::vector<double> &area)
     return 0;
 }
 
+struct RecallTimes {
+    double last_s = -1; // below 0: from and to
+    std::string from, to;
+};
+
+// What was asked for; wrong words are wrong usage.
+oc_recall_request_t recall_request(const RecallTimes &times)
+{
+    oc_recall_request_t request{};
+    request.is_relative = times.last_s >= 0;
+    if (request.is_relative) {
+        request.last_ms = static_cast<std::uint32_t>(times.last_s * 1000);
+        return request;
+    }
+    request.from_us = outcrop::parse_utc(times.from);
+    request.to_us = outcrop::parse_utc(times.to);
+    if (request.from_us > request.to_us) throw std::runtime_error("--from is later than --to");
+    return request;
+}
+
+int recall(const std::string &file, const RecallTimes &times)
+{
+    oc_recall_request_t request;
+    try {
+        request = recall_request(times);
+    } catch (const std::exception &fault) {
+        std::fprintf(stderr, "outcrop-base: %s\n", fault.what());
+        return 2;
+    }
+    oc_base_config_t config;
+    if (!oc_base_config_load(file.c_str(), &config, print_fault, nullptr)) return 1;
+    const int n = outcrop::send_recall(config, request, {});
+    say(std::to_string(n) + " packets of views of that time have come");
+    return 0;
+}
+
+void add_recall(CLI::App *command, std::string *config, RecallTimes *times)
+{
+    command->add_option("--config", *config, "YAML configuration, as of live")->required();
+    CLI::Option *last =
+        command->add_option("--last", times->last_s, "seconds before the request arrives")->check(CLI::Range(0.0, 4e6));
+    CLI::Option *from = command->add_option("--from", times->from, "UTC, 2026-01-31T12:00:00Z or microseconds");
+    CLI::Option *to = command->add_option("--to", times->to, "UTC, not before --from");
+    from->needs(to)->excludes(last);
+    to->needs(from)->excludes(last);
+    command->final_callback([=] {
+        if (last->count() == 0 && from->count() == 0)
+            throw CLI::RequiredError("--last SECONDS, or --from UTC --to UTC");
+    });
+}
+
 } // namespace
 
 int main(int argc, char **argv)
@@ -84,6 +136,10 @@ int main(int argc, char **argv)
     replay_command->add_option("--vehicle", options.vehicle, "id; default: the first in the log")
         ->check(CLI::Range(0, 255));
 
+    RecallTimes times;
+    CLI::App *recall_command = app.add_subcommand("recall", "have views of a stretch of time sent, held back or not");
+    add_recall(recall_command, &config, &times);
+
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError &fault) {
@@ -93,6 +149,7 @@ int main(int argc, char **argv)
     cv::setNumThreads(1); // sums in one order, whatever the machine
     try {
         if (is_print) return oc_base_config_print_sample(stdout) ? 0 : 1;
+        if (*recall_command) return recall(config, times);
         return *live_command ? live(config, is_check) : replay(options, area);
     } catch (const std::exception &fault) {
         std::fprintf(stderr, "outcrop-base: %s\n", fault.what());

@@ -59,6 +59,7 @@ static void take_source(const yaml_source_t *source, oc_config_t *config)
     config->source = OC_SOURCE_SITE;
     COPY_TEXT(config->site, source->site);
     config->site_option.period_ms = uint_or(source->period_ms, "source.period_ms");
+    config->site_option.repeat = uint_or(source->repeat, "source.repeat");
     config->site_option.is_looped = FLAG_OR(source->loop, "source.loop");
     config->site_option.has_keyframe_policy =
         WORD_OR(yaml_keyframe_use_t, source->keyframes, "source.keyframes") == YAML_KEYFRAME_MOVED;

@@ -29,8 +29,10 @@ static const cyaml_strval_t keyframe_words[] = {{"all", YAML_KEYFRAME_ALL}, {"mo
 static const cyaml_schema_field_t source_fields[] = {
     CYAML_FIELD_STRING_PTR("site", CYAML_FLAG_POINTER, yaml_source_t, site, 1, LONGEST),
     CYAML_FIELD_UINT_PTR("period_ms", OPTIONAL, yaml_source_t, period_ms),
+    CYAML_FIELD_UINT_PTR("repeat", OPTIONAL, yaml_source_t, repeat),
     WORD_FIELD("loop", yaml_source_t, loop, bool_words),
-    WORD_FIELD("keyframes", yaml_source_t, keyframes, keyframe_words), CYAML_FIELD_END};
+    WORD_FIELD("keyframes", yaml_source_t, keyframes, keyframe_words),
+    CYAML_FIELD_END};
 
 static const cyaml_schema_field_t mount_fields[] = {
     CYAML_FIELD_FLOAT("x_m", CYAML_FLAG_DEFAULT, yaml_mount_t, x_m),

@@ -21,7 +21,7 @@ typedef enum yaml_keyframe_use { YAML_KEYFRAME_ALL, YAML_KEYFRAME_MOVED } yaml_k
 
 typedef struct yaml_source {
     char *site;
-    uint32_t *period_ms;
+    uint32_t *period_ms, *repeat;
     yaml_bool_t *loop;
     yaml_keyframe_use_t *keyframes;
 } yaml_source_t;

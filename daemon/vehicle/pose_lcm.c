@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "bot_core_pose_t.h"
+#include "counters.h"
 #include "link_lcm.h"
 #include "outcrop_pose_t.h"
 

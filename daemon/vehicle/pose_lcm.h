@@ -6,14 +6,18 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "counters.h"
 #include "pose_track.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 typedef enum oc_pose_type {
     OC_POSE_OUTCROP, /* outcrop.pose_t: body z up, with covariance */
     OC_POSE_BOT_CORE /* bot_core.pose_t: body x forward, y right, z down */
 } oc_pose_type_t;
 
+typedef struct oc_counters oc_counters_t; /* counters.h, whose atomics are C */
 typedef struct oc_pose_listener oc_pose_listener_t;
 
 /* Subscribe, and add every pose that comes to the track, counted in POSES_IN,
@@ -27,4 +31,7 @@ void oc_pose_listener_close(oc_pose_listener_t *listener);
 int oc_pose_listener_fd(const oc_pose_listener_t *listener);
 bool oc_pose_listener_handle(oc_pose_listener_t *listener); /* false: the transport failed */
 
+#ifdef __cplusplus
+}
+#endif
 #endif

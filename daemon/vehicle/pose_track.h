@@ -10,6 +10,10 @@
 
 #include "core/camera.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Body: x forward, y left, z up. Position and orientation in the world. */
 typedef struct oc_body_pose {
     int64_t utime_us;
@@ -66,4 +70,7 @@ oc_pose_t oc_pose_of_camera(const oc_body_pose_t *body, const oc_pose_t *body_fr
 oc_margin_t oc_margin_of_camera(const oc_body_pose_t *body, const oc_pose_t *body_from_optical,
                                 const oc_margin_t *least);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

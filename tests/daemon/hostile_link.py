@@ -6,9 +6,7 @@ Datagrams that are no packets, packets for another vehicle and more requests tha
 our own in a private network namespace. outcropd must go on, and every one of them must be in its counters.
 """
 import argparse
-import ctypes
 import json
-import os
 import pathlib
 import random
 import signal
@@ -19,26 +17,15 @@ import sys
 import tempfile
 import time
 
+from private_network import enter_private_network
+
 DOWN, UP = ("239.255.76.67", 7667), ("239.255.76.68", 7668)
-CLONE_NEWUSER, CLONE_NEWNET = 0x10000000, 0x40000000
 VEHICLE = 1
 PACKET_HASH = None  # learnt from what the vehicle sends
 
 
 def fail(*what):
     sys.exit("hostile_link: " + " ".join(str(w) for w in what))
-
-
-def enter_private_network():
-    uid, gid = os.getuid(), os.getgid()
-    if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWUSER | CLONE_NEWNET) != 0:
-        print("hostile_link: SKIPPED: no private network namespace can be made here")
-        sys.exit(77)
-    pathlib.Path("/proc/self/setgroups").write_text("deny")
-    pathlib.Path("/proc/self/uid_map").write_text(f"0 {uid} 1")
-    pathlib.Path("/proc/self/gid_map").write_text(f"0 {gid} 1")
-    for command in (["ip", "link", "set", "lo", "up"], ["ip", "route", "add", "239.0.0.0/8", "dev", "lo"]):
-        subprocess.run(command, check=True)
 
 
 def crc16(data):
@@ -140,7 +127,7 @@ def main():
     parser.add_argument("--bin", type=pathlib.Path, required=True)
     parser.add_argument("--site", type=pathlib.Path, required=True)
     options = parser.parse_args()
-    enter_private_network()
+    enter_private_network("hostile_link")
     global PACKET_HASH
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)

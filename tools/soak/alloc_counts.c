@@ -5,6 +5,7 @@
  * The file is an array of slots, one a thread: int32 tid, int32 unused, uint64 allocations, uint64 frees. */
 #define _GNU_SOURCE
 #include <fcntl.h>
+#include <malloc.h>
 #include <stdatomic.h>
 #include <stddef.h>
 #include <stdint.h>
