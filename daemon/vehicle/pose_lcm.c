@@ -12,6 +12,9 @@
 #include "link_lcm.h"
 #include "outcrop_pose_t.h"
 
+/* More than either type has. */
+#define MAX_BYTES 1024u
+
 struct oc_pose_listener {
     lcm_t *lcm;
     oc_pose_type_t type;
@@ -42,14 +45,19 @@ static bool decode_bot_core(const void *bytes, int n_bytes, oc_body_pose_t *pose
     return true;
 }
 
+bool oc_pose_decode(oc_pose_type_t type, const void *bytes, size_t n_bytes, oc_body_pose_t *pose)
+{
+    if (n_bytes > MAX_BYTES) return false;
+    return type == OC_POSE_OUTCROP ? decode_outcrop(bytes, (int)n_bytes, pose)
+                                   : decode_bot_core(bytes, (int)n_bytes, pose);
+}
+
 static void on_message(const lcm_recv_buf_t *buf, const char *channel, void *user)
 {
     (void)channel;
     oc_pose_listener_t *l = user;
     oc_body_pose_t pose;
-    const int n_bytes = (int)buf->data_size;
-    const bool is_decoded = l->type == OC_POSE_OUTCROP ? decode_outcrop(buf->data, n_bytes, &pose)
-                                                       : decode_bot_core(buf->data, n_bytes, &pose);
+    const bool is_decoded = oc_pose_decode(l->type, buf->data, buf->data_size, &pose);
     const oc_status_t status = is_decoded ? oc_pose_track_add(l->track, &pose) : OC_E_FORMAT;
     if (status == OC_OK) {
         oc_counters_add(l->counters, OC_COUNT_POSES_IN, 1);

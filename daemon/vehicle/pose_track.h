@@ -39,9 +39,11 @@ void oc_pose_track_destroy(oc_pose_track_t *track);
 int oc_pose_track_fd(const oc_pose_track_t *track);
 void oc_pose_track_clear(oc_pose_track_t *track);
 
-/* OC_OK; OC_E_ARG when it is not a pose (not finite, not a unit quaternion
- * within 1e-3, covariance not symmetric and positive semidefinite);
- * OC_E_STATE when not newer than the last one. */
+/* OC_OK; OC_E_ARG when it is not a pose (not finite, farther than 1e9 m from
+ * the origin, not a unit quaternion within 1e-3, covariance not symmetric and
+ * positive semidefinite); OC_E_STATE when not newer than the last one. After ten
+ * of these in a row, each newer than the one before, the publisher's clock must
+ * have been set back: the track begins anew with the next. */
 OC_CHECKED oc_status_t oc_pose_track_add(oc_pose_track_t *track, const oc_body_pose_t *pose);
 
 /* The pose at a time: position linear, rotation on the shorter arc, the
