@@ -68,7 +68,8 @@ oc_pose_t oc_pose_of_camera(const oc_body_pose_t *body, const oc_pose_t *body_fr
  * one sigma times sqrt 3 (a uniform error of that half-width has that sigma);
  * not smaller than `least`, which is all there is without a covariance, and
  * angles not larger than 45 degrees: where phi nears 90 degrees (a camera that
- * looks level to the east or west) omega and kappa are hardly to be told apart. */
+ * looks level to the east or west) omega and kappa are hardly to be told apart,
+ * and phi gets smaller whichever way the view strays, which is in its margin. */
 oc_margin_t oc_margin_of_camera(const oc_body_pose_t *body, const oc_pose_t *body_from_optical,
                                 const oc_margin_t *least);
 
