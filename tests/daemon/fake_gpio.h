@@ -37,6 +37,7 @@ static const char *const fake_names[FAKE_N_ROLES] = {"trigger", "strobe", "heart
 
 /* Held by a test: the thread stands still in its next call of set. */
 static pthread_mutex_t fake_gate = PTHREAD_MUTEX_INITIALIZER;
+static bool fake_is_held;
 
 static pthread_mutex_t fake_lock = PTHREAD_MUTEX_INITIALIZER; /* of what follows */
 static oc_gpio_line_t fake_lines[FAKE_N_ROLES];
@@ -49,6 +50,19 @@ static inline int64_t fake_now_ns(void)
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
     return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
+}
+
+static inline void fake_hold(void)
+{
+    pthread_mutex_lock(&fake_gate);
+    fake_is_held = true;
+}
+
+/* Also for tearDown, when a test failed while it held the thread. */
+static inline void fake_release(void)
+{
+    if (fake_is_held) pthread_mutex_unlock(&fake_gate);
+    fake_is_held = false;
 }
 
 static inline void fake_reset(void)

@@ -32,6 +32,7 @@ void setUp(void)
 
 void tearDown(void)
 {
+    fake_release();
     guard_is_armed = false;
     oc_gpio_close(gpio);
     gpio = NULL;
@@ -103,11 +104,11 @@ static void a_held_up_trigger_counts_the_beats_it_missed_and_gives_no_burst(void
     open_all_right();
     const int64_t after_ns = fake_now_ns();
     FAKE_AWAIT(fake_count(FAKE_TRIGGER, false) >= 3);
-    pthread_mutex_lock(&fake_gate);
+    fake_hold();
     const int64_t held_ns = fake_now_ns();
     FAKE_AWAIT(fake_now_ns() - held_ns > 10 * 20 * NS_PER_MS);
     const uint32_t n_before = fake_count(FAKE_TRIGGER, true);
-    pthread_mutex_unlock(&fake_gate);
+    fake_release();
     FAKE_AWAIT(fake_count(FAKE_TRIGGER, false) >= n_before + 5);
     close_now();
     TEST_ASSERT_TRUE(count_of(OC_COUNT_PULSES_MISSED) >= 7);
@@ -131,7 +132,7 @@ static void a_frame_finds_the_last_pulse_before_it(void)
     config.trigger_rate_hz = 200;
     open_all_right();
     FAKE_AWAIT(fake_count(FAKE_TRIGGER, true) >= 100);
-    pthread_mutex_lock(&fake_gate); /* the thread stands still, so that no pulse is forgotten meanwhile */
+    fake_hold(); /* the thread stands still, so that no pulse is forgotten meanwhile */
     fake_sleep_us(50000);
     uint32_t n = fake_sets_of(FAKE_TRIGGER, sets), n_rises = 0;
     for (uint32_t i = 0; i < n; i++) {
@@ -153,7 +154,7 @@ static void a_frame_finds_the_last_pulse_before_it(void)
         TEST_ASSERT_EQUAL(at_ns - starts_ns[last] <= period_ns, is_found);
         if (is_found) TEST_ASSERT_EQUAL_INT64(starts_ns[last], found_ns);
     }
-    pthread_mutex_unlock(&fake_gate);
+    fake_release();
 }
 
 static void a_frame_before_the_first_pulse_or_a_period_after_the_last_has_none(void)
@@ -178,9 +179,9 @@ static void a_pulse_that_was_not_given_has_no_frames(void)
     open_all_right();
     FAKE_AWAIT(count_of(OC_COUNT_GPIO_FAULTS) == 1);
     fake_sleep_us(100000);
-    pthread_mutex_lock(&fake_gate);
+    fake_hold();
     fake_sleep_us(30000);
-    pthread_mutex_unlock(&fake_gate);
+    fake_release();
     TEST_ASSERT_EQUAL(1, count_of(OC_COUNT_GPIO_FAULTS)); /* told once */
     FAKE_CHANGE(FAKE_TRIGGER, is_stuck, false);
     FAKE_AWAIT(fake_count(FAKE_TRIGGER, true) >= 1);
@@ -273,7 +274,7 @@ static void the_strobe_follows_the_trigger_after_its_delay(void)
     config.strobe_delay_us = 10000;
     open_all_right();
     FAKE_AWAIT(fake_count(FAKE_STROBE, false) >= 8);
-    pthread_mutex_lock(&fake_gate);
+    fake_hold();
     fake_sleep_us(20000);
     check_pulses(FAKE_STROBE, config.strobe_pulse_us);
     const uint32_t n = fake_sets_of(FAKE_STROBE, sets);
@@ -282,7 +283,7 @@ static void the_strobe_follows_the_trigger_after_its_delay(void)
         const bool is_found = oc_gpio_pulse_of(gpio, sets[i].at_ns - 10 * NS_PER_MS, &start_ns);
         TEST_ASSERT_TRUE(is_found || count_of(OC_COUNT_PULSES_MISSED) > 0);
     }
-    pthread_mutex_unlock(&fake_gate);
+    fake_release();
     close_now();
     const uint32_t n_triggers = fake_count(FAKE_TRIGGER, true), n_strobes = fake_count(FAKE_STROBE, true);
     TEST_ASSERT_TRUE(n_strobes <= n_triggers);

@@ -28,6 +28,7 @@ void setUp(void)
 
 void tearDown(void)
 {
+    fake_release();
     oc_gpio_close(gpio);
     gpio = NULL;
 }
