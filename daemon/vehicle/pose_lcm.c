@@ -3,6 +3,7 @@
 #include "pose_lcm.h"
 
 #include <lcm/lcm.h>
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,9 +12,6 @@
 #include "counters.h"
 #include "link_lcm.h"
 #include "outcrop_pose_t.h"
-
-/* More than either type has. */
-#define MAX_BYTES 1024u
 
 struct oc_pose_listener {
     lcm_t *lcm;
@@ -47,7 +45,7 @@ static bool decode_bot_core(const void *bytes, int n_bytes, oc_body_pose_t *pose
 
 bool oc_pose_decode(oc_pose_type_t type, const void *bytes, size_t n_bytes, oc_body_pose_t *pose)
 {
-    if (n_bytes > MAX_BYTES) return false;
+    if (n_bytes > INT_MAX) return false;
     return type == OC_POSE_OUTCROP ? decode_outcrop(bytes, (int)n_bytes, pose)
                                    : decode_bot_core(bytes, (int)n_bytes, pose);
 }

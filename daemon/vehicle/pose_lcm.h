@@ -17,12 +17,11 @@ typedef enum oc_pose_type {
     OC_POSE_BOT_CORE /* bot_core.pose_t: body x forward, y right, z down */
 } oc_pose_type_t;
 
-/* One encoded message, n_bytes of it, into a pose that is still to be judged
- * (oc_pose_track_add). False when it is no message of the type, whole and alone. */
-bool oc_pose_decode(oc_pose_type_t type, const void *bytes, size_t n_bytes, oc_body_pose_t *pose);
-
 typedef struct oc_counters oc_counters_t; /* counters.h, whose atomics are C */
 typedef struct oc_pose_listener oc_pose_listener_t;
+
+/* An LCM payload as a body pose; false when it is not of the type, cut or too long. Its values are not looked at. */
+bool oc_pose_decode(oc_pose_type_t type, const void *bytes, size_t n_bytes, oc_body_pose_t *pose);
 
 /* Subscribe, and add every pose that comes to the track, counted in POSES_IN,
  * POSES_BAD, POSES_LATE. NULL and one line in error when the URL cannot be opened. */
