@@ -99,7 +99,8 @@ static void an_enable_input_that_cannot_be_read_is_told_at_the_start(void)
 static void the_enable_input_follows_its_edges(void)
 {
     open_enable(1);
-    for (int i = 0; i < 10; i++) {
+    const int64_t begin_ns = fake_now_ns();
+    for (int i = 0; i < 40; i++) {
         const int level = i % 2;
         FAKE_CHANGE(FAKE_ENABLE, level, level);
         fake_edge(FAKE_ENABLE, level == 1, fake_now_ns());
@@ -108,6 +109,19 @@ static void the_enable_input_follows_its_edges(void)
         TEST_ASSERT_EQUAL(level == 1, oc_gpio_is_enabled(gpio));
         TEST_ASSERT_FALSE(has_news(0));
     }
+    TEST_ASSERT_TRUE(fake_now_ns() - begin_ns < 25 * NS_PER_S); /* not only when it is read again, once a second */
+}
+
+static void a_quiet_input_costs_nothing(void)
+{
+    config.mark.is_used = true;
+    open_enable(1);
+    const int64_t begin_ns = fake_now_ns();
+    FAKE_AWAIT(fake_look(FAKE_ENABLE).n_gets >= 3);
+    fake_sleep_us(100000);
+    const uint32_t n_gets = fake_look(FAKE_ENABLE).n_gets;
+    TEST_ASSERT_TRUE(n_gets <= 2 + (fake_now_ns() - begin_ns) / NS_PER_S);
+    TEST_ASSERT_EQUAL(0, fake_look(FAKE_MARK).n_takes);
 }
 
 static void a_lost_edge_of_the_enable_input_heals(void)
@@ -241,6 +255,7 @@ int main(void)
     RUN_TEST(the_enable_input_counts_from_the_start);
     RUN_TEST(an_enable_input_that_cannot_be_read_is_told_at_the_start);
     RUN_TEST(the_enable_input_follows_its_edges);
+    RUN_TEST(a_quiet_input_costs_nothing);
     RUN_TEST(a_lost_edge_of_the_enable_input_heals);
     RUN_TEST(a_dead_enable_input_stays_as_it_was_and_is_told_once);
     RUN_TEST(an_input_that_hangs_up_is_polled_no_more);
