@@ -204,7 +204,7 @@ class Poses(Program):
     """Poses of one view of a site, again and again."""
 
     def __init__(self, bin_folder, site, view=0):
-        super().__init__(str(bin_folder / "outcrop-pose-replay"), str(site), "--url", POSES, "--hold", str(view),
+        super().__init__(str(bin_folder / "outcrop-pose-replay"), str(site), "--lcm-url", POSES, "--rate", "20", "--hold", str(view),
                          name="poses", takes_input=True)
 
     def hold(self, view):
@@ -275,7 +275,8 @@ class Vivid:
         self.set_up()
 
     def set_up(self):
-        """Links to the nodes of now, and a still picture with corners."""
+        """Links to the nodes of now, a still picture with corners, times of the start of a frame: those of its end are
+        9/10 of a period ahead when it is handed out."""
         for k, link in enumerate(self.links):
             named = [entry.parent.name for entry in pathlib.Path("/sys/class/video4linux").glob("video*/name")
                      if entry.read_text().strip() == f"vivid-{k:03d}-vid-cap"]
@@ -283,7 +284,7 @@ class Vivid:
             beside = link.with_suffix(".new")
             beside.symlink_to(f"/dev/{named[0]}")
             beside.rename(link)
-            self.control(k, osd_text_mode=2, test_pattern=PATTERN)
+            self.control(k, osd_text_mode=2, test_pattern=PATTERN, timestamp_source=TIME_OF_START)
 
     def control(self, k, **values):
         told = ",".join(f"{name}={value}" for name, value in values.items())
@@ -300,6 +301,7 @@ class Vivid:
 
 
 PATTERN = 4  # of vivid: "100% Color Squares"
+TIME_OF_END, TIME_OF_START = 0, 1
 
 
 # ---- GPIO

@@ -10,8 +10,8 @@ import sys
 import time
 import traceback
 
-from guest_kit import (SCRATCH, Failed, GpioChip, Outcropd, Poses, Tap, UsbCamera, Vivid, camera_section, expect,
-                       site_views, wait_for, write_calibration)
+from guest_kit import (SCRATCH, TIME_OF_END, TIME_OF_START, Failed, GpioChip, Outcropd, Poses, Tap, UsbCamera, Vivid,
+                       camera_section, expect, site_views, wait_for, write_calibration)
 from guest_service import ServiceGroup
 
 
@@ -78,6 +78,18 @@ class VividGroup(Group):
                 self.vivid.control(0, percentage_of_dropped_buffers=0)
             daemon.wait_frames()
             expect(daemon.counters()["camera_opened"] == 1, "lost frames are no reason to open the camera again")
+            daemon.end()
+
+    def future_times(self):
+        """Frames that the driver dates ahead of now are not believed."""
+        with self.one_camera() as daemon:
+            daemon.wait_frames()
+            self.vivid.control(0, timestamp_source=TIME_OF_END)
+            try:
+                daemon.wait_more(frames_bad_time=5)
+            finally:
+                self.vivid.control(0, timestamp_source=TIME_OF_START)
+            daemon.wait_frames()
             daemon.end()
 
     def streaming_fault(self, inject):
@@ -151,6 +163,7 @@ class VividGroup(Group):
             yield f"format {name}", lambda name=name: self.format(name)
         yield "a buffer flagged as damaged", self.flagged_buffer
         yield "dropped buffers", self.dropped_buffers
+        yield "times in the future", self.future_times
         yield "a buffer is refused", lambda: self.streaming_fault("inject_vidioc_qbuf_error")
         yield "a fatal error while streaming", lambda: self.streaming_fault("inject_fatal_streaming_error")
         yield "buffers are refused at start", lambda: self.start_fault("inject_vidioc_reqbufs_error")

@@ -14,7 +14,7 @@ import tempfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 SITE = HERE.parent / "data/sites/depot"
-PROGRAMS = ("qemu-system-x86_64", "busybox", "cpio", "xz", "modprobe", "v4l2-ctl", "udevadm")
+PROGRAMS = ("qemu-system-x86_64", "busybox", "cpio", "xz", "modprobe", "v4l2-ctl", "udevadm", "systemctl")
 USB = ("uvcvideo nodrop=1", "dummy_hcd", "gadgetfs")  # nodrop: damaged frames come through, flagged
 
 # Modules, and whether systemd and udevd are wanted.

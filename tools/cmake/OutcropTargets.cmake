@@ -34,6 +34,7 @@ endfunction()
 add_custom_target(tests_unit)
 add_custom_target(tests_site)
 add_custom_target(tests_threads)
+add_custom_target(tests_vm)
 
 # What all test programs share: where they are built, where test data is.
 function(outcrop_test_program name)
