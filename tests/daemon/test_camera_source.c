@@ -513,7 +513,9 @@ static void every_frame_is_handed_out_or_counted(void)
     const uint32_t n_counted = count(OC_COUNT_FRAMES_FLAGGED) + count(OC_COUNT_FRAMES_CORRUPT) +
                                count(OC_COUNT_FRAMES_BAD_TIME) + count(OC_COUNT_FRAMES_NO_POSE) +
                                count(OC_COUNT_FRAMES_OVERRUN);
+    pthread_mutex_lock(&fake_lock);
     n_lost_with_camera += fake_devices[0].n_discarded + fake_devices[0].n_events;
+    pthread_mutex_unlock(&fake_lock);
     printf("%u frames: %u handed out, %u counted, at most %u gone with their camera; %u without a pose\n", n_given,
            n_out, n_counted, n_lost_with_camera, count(OC_COUNT_FRAMES_NO_POSE));
     TEST_ASSERT_TRUE(n_out + n_counted <= n_given);
