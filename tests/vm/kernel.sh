@@ -11,11 +11,19 @@ cache=${OUTCROP_VM_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/outcrop-vm}
 skip() { printf 'vm: SKIPPED: %s\n' "$*" >&2; exit 77; }
 die() { printf 'vm: %s\n' "$*" >&2; exit 1; }
 
+image_package() {
+    apt-cache show --no-all-versions "linux-image-$series-amd64" 2>/dev/null |
+        sed -n 's/^Depends: \(linux-image-[^ ]*\).*/\1/p' | head -n 1
+}
+
 # The kernel that the meta package stands for today, else the newest one kept.
 kernel_version() {
     local image
-    image=$(apt-cache show --no-all-versions "linux-image-$series-amd64" 2>/dev/null |
-        sed -n 's/^Depends: \(linux-image-[^ ]*\).*/\1/p' | head -n 1) || true
+    image=$(image_package) || true
+    if [ -z "$image" ] && [ "$(id -u)" = 0 ]; then # a machine without package lists
+        apt-get -qq -o Acquire::Retries=3 update >/dev/null 2>&1 || true
+        image=$(image_package) || true
+    fi
     if [ -n "$image" ]; then
         echo "${image#linux-image-}"
     else
