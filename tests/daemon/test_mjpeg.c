@@ -246,8 +246,10 @@ static void damage_is_mostly_seen_and_never_does_harm(void)
         memcpy(damaged, frame, n_frame);
         const int kind = rand() % 3;
         const size_t at = 2u + (size_t)rand() % (n_frame - 2u), n = 1u + (size_t)rand() % 64u;
-        for (size_t k = at; k < at + n && k < n_frame; k++)
-            damaged[k] = kind == 0 ? (uint8_t)rand() : (kind == 1 ? 0 : (uint8_t)(damaged[k] ^ 1u << rand() % 8));
+        for (size_t k = at; k < at + n && k < n_frame; k++) {
+            const unsigned flipped = damaged[k] ^ 1u << rand() % 8;
+            damaged[k] = (uint8_t)(kind == 0 ? (unsigned)rand() : kind == 1 ? 0 : flipped);
+        }
         oc_image_t image;
         const bool is_ok = decode(damaged, n_frame, &image);
         n_refused += !is_ok;

@@ -334,6 +334,13 @@ class GpioGroup(Group):
             return
         raise Failed("outcropd starts although the line cannot be had")
 
+    def held(self):
+        """A second daemon wants a line that the first one holds."""
+        with self.one_camera({"mark": {"line": "mark"}}) as first:
+            first.wait_frames()
+            self.refused({"mark": {"line": "mark"}}, "mark", "held by", "outcropd")
+            first.end()
+
     def depot(self):
         """The depot's views arrive as frames, each with its pose, and leave as views."""
         gpio = {"enable": {"line": "enable"}, "mark": {"line": "mark", "debounce_ms": 10}}
@@ -364,6 +371,7 @@ class GpioGroup(Group):
         yield "mark", self.mark
         yield "a line that is not there", lambda: self.refused({"mark": {"line": "nowhere"}}, "mark", "nowhere")
         yield "the same line twice", lambda: self.refused({"mark": {"line": "mark"}, "enable": {"line": "mark"}}, "mark")
+        yield "a line that another program holds", self.held
         yield "the depot through a camera", self.depot
 
 
