@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause
- * The thread that opens and closes cameras. */
+ * The threads that open and close cameras. */
 #include "camera_opener.h"
 
 #include <pthread.h>
@@ -17,23 +17,23 @@ typedef struct order {
     oc_opened_t opened;
 } order_t;
 
+/* What a thread is started with. */
+typedef struct opener_thread {
+    struct oc_camera_opener *opener;
+    order_t *order;
+    pthread_t id;
+} opener_thread_t;
+
 struct oc_camera_opener {
     const oc_video_ops_t *ops;
-    pthread_t thread;
     pthread_mutex_t lock;
     pthread_cond_t given;
     bool is_stopped;
     int done_fd;
+    uint32_t n_threads;
+    opener_thread_t threads[OC_MAX_CAMERAS];
     order_t orders[OC_MAX_CAMERAS];
 };
-
-static order_t *next_order(oc_camera_opener_t *opener)
-{
-    for (uint32_t i = 0; i < OC_MAX_CAMERAS; i++) {
-        if (opener->orders[i].state == ORDER_GIVEN) return &opener->orders[i];
-    }
-    return NULL;
-}
 
 static void carry_out(const oc_video_ops_t *ops, order_t *order)
 {
@@ -48,12 +48,13 @@ static void carry_out(const oc_video_ops_t *ops, order_t *order)
 
 static void *thread_main(void *user)
 {
-    oc_camera_opener_t *opener = user;
+    const opener_thread_t *thread = user;
+    oc_camera_opener_t *opener = thread->opener;
+    order_t *order = thread->order;
     const uint64_t one = 1;
     pthread_mutex_lock(&opener->lock);
     while (!opener->is_stopped) {
-        order_t *order = next_order(opener);
-        if (!order) {
+        if (order->state != ORDER_GIVEN) {
             pthread_cond_wait(&opener->given, &opener->lock);
             continue;
         }
@@ -68,7 +69,7 @@ static void *thread_main(void *user)
     return NULL;
 }
 
-oc_camera_opener_t *oc_camera_opener_create(const oc_video_ops_t *ops)
+oc_camera_opener_t *oc_camera_opener_create(const oc_video_ops_t *ops, uint32_t n_cameras)
 {
     oc_camera_opener_t *opener = calloc(1, sizeof *opener);
     if (!opener) return NULL;
@@ -76,9 +77,16 @@ oc_camera_opener_t *oc_camera_opener_create(const oc_video_ops_t *ops)
     opener->done_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     pthread_mutex_init(&opener->lock, NULL);
     pthread_cond_init(&opener->given, NULL);
-    if (opener->done_fd >= 0 && pthread_create(&opener->thread, NULL, thread_main, opener) == 0) return opener;
-    if (opener->done_fd >= 0) close(opener->done_fd);
-    free(opener);
+    bool is_ok = opener->done_fd >= 0;
+    for (uint32_t i = 0; is_ok && i < n_cameras; i++) {
+        opener_thread_t *thread = &opener->threads[i];
+        thread->opener = opener;
+        thread->order = &opener->orders[i];
+        is_ok = pthread_create(&thread->id, NULL, thread_main, thread) == 0;
+        opener->n_threads += is_ok;
+    }
+    if (is_ok) return opener;
+    oc_camera_opener_destroy(opener);
     return NULL;
 }
 
@@ -87,15 +95,15 @@ void oc_camera_opener_destroy(oc_camera_opener_t *opener)
     if (!opener) return;
     pthread_mutex_lock(&opener->lock);
     opener->is_stopped = true;
-    pthread_cond_signal(&opener->given);
+    pthread_cond_broadcast(&opener->given);
     pthread_mutex_unlock(&opener->lock);
-    pthread_join(opener->thread, NULL);
+    for (uint32_t i = 0; i < opener->n_threads; i++) pthread_join(opener->threads[i].id, NULL);
     for (uint32_t i = 0; i < OC_MAX_CAMERAS; i++) {
         order_t *order = &opener->orders[i];
         if (order->state == ORDER_GIVEN && order->video) opener->ops->close(order->video);
         if (order->state == ORDER_DONE && order->opened.video) opener->ops->close(order->opened.video);
     }
-    close(opener->done_fd);
+    if (opener->done_fd >= 0) close(opener->done_fd);
     pthread_cond_destroy(&opener->given);
     pthread_mutex_destroy(&opener->lock);
     free(opener);
@@ -108,7 +116,7 @@ void oc_camera_opener_order(oc_camera_opener_t *opener, uint32_t camera, oc_vide
     order->state = ORDER_GIVEN;
     order->video = video;
     order->wish = wish;
-    pthread_cond_signal(&opener->given);
+    pthread_cond_broadcast(&opener->given);
     pthread_mutex_unlock(&opener->lock);
 }
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause
- * Opening and closing of cameras in a thread of its own: a USB device takes up
- * to half a second for it, and frames of the others must not wait. */
+ * Opening and closing of cameras, in a thread for each: a USB device takes up
+ * to half a second for it, a broken one for ever, and the others must not wait. */
 #ifndef OUTCROP_DAEMON_CAMERA_OPENER_H
 #define OUTCROP_DAEMON_CAMERA_OPENER_H
 
@@ -22,8 +22,8 @@ typedef struct oc_opened {
 
 typedef struct oc_camera_opener oc_camera_opener_t;
 
-/* One order at a time for each of OC_MAX_CAMERAS; NULL: no memory or no thread. */
-oc_camera_opener_t *oc_camera_opener_create(const oc_video_ops_t *ops);
+/* One order at a time for each of n_cameras (at most OC_MAX_CAMERAS); NULL: no memory or no thread. */
+oc_camera_opener_t *oc_camera_opener_create(const oc_video_ops_t *ops, uint32_t n_cameras);
 /* Waits for what is under way, and closes what nobody has collected. */
 void oc_camera_opener_destroy(oc_camera_opener_t *opener);
 

@@ -33,7 +33,7 @@ static bool find_pose(camera_source_t *source, oc_live_camera_t *camera, int64_t
         if (answer == OC_POSE_OK) return true;
         const bool is_late = now_ns - first->arrived_ns >= source->config.pose_wait_ms * NS_PER_MS;
         if (answer == OC_POSE_NOT_YET && !is_late) return false;
-        oc_live_camera_drop_oldest(camera, OC_COUNT_FRAMES_NO_POSE);
+        oc_live_camera_drop_oldest(camera, OC_COUNT_FRAMES_NO_POSE, now_ns);
     }
     return false;
 }
@@ -127,7 +127,7 @@ static oc_capture_result_t source_next(oc_capture_t *self, int64_t now_ns, oc_ca
     while ((camera = choose(source, now_ns, &pose))) {
         const oc_waiting_frame_t waiting = camera->waiting[0];
         oc_raw_image_t raw;
-        if (!oc_live_camera_hand_out(camera, &raw)) continue;
+        if (!oc_live_camera_hand_out(camera, now_ns, &raw)) continue;
         *frame = (oc_captured_t){.raw = raw};
         fill(source, camera, &waiting, &pose, frame);
         return OC_CAPTURE_FRAME;
@@ -215,7 +215,7 @@ oc_capture_t *oc_camera_source_open(const oc_camera_source_config_t *config, con
         source->config = *config;
         source->config.n_cameras = 0; /* grows with what source_close has to undo */
         source->parts = *parts;
-        source->opener = oc_camera_opener_create(parts->video);
+        source->opener = oc_camera_opener_create(parts->video, config->n_cameras);
         is_ok = source->opener != NULL;
         for (uint32_t i = 0; is_ok && i < config->n_cameras; i++) {
             source->config.n_cameras++;

@@ -152,6 +152,8 @@ static bool set_format(int fd, const oc_video_wish_t *wish, const complaint_t *c
         return complain(c, "has no %ux%u in %s; it offers%s, and would give %ux%u", wish->width_px, wish->height_px,
                         oc_pixel_format_name(wish->format), offers, pix->width, pix->height);
     }
+    if (wish->format != OC_PIXEL_MJPG && pix->bytesperline < oc_pixel_format_row_bytes(wish->format, wish->width_px))
+        return complain(c, "says that a row has %u bytes, which are too few", pix->bytesperline);
     if (pix->field != V4L2_FIELD_NONE && pix->field != V4L2_FIELD_ANY) return complain(c, "gives interlaced pictures");
     mode->stride_bytes = wish->format == OC_PIXEL_MJPG ? 0 : pix->bytesperline;
     mode->buffer_bytes = pix->sizeimage;

@@ -22,25 +22,41 @@ static void count(const oc_live_camera_t *camera, oc_counter_t counter, uint32_t
     oc_counters_add(camera->parts->counters, counter, n);
 }
 
-/* A change of state, for people: at most one a second, so that a camera that comes and goes does not fill a disk. */
-__attribute__((format(printf, 3, 4))) static void tell(oc_live_camera_t *camera, int64_t now_ns, const char *format,
-                                                       ...)
+static void set_message(oc_live_camera_t *camera, int64_t now_ns, const char *what)
 {
-    if (camera->message[0] || (camera->told_ns != 0 && now_ns - camera->told_ns < NS_PER_S)) {
-        camera->n_untold++;
-        return;
-    }
-    char what[OC_CAMERA_ERROR_BYTES];
-    va_list args;
-    va_start(args, format);
-    vsnprintf(what, sizeof what, format, args);
-    va_end(args);
     char untold[48] = "";
     if (camera->n_untold > 0)
         snprintf(untold, sizeof untold, " (%" PRIu32 " changes before this untold)", camera->n_untold);
     snprintf(camera->message, sizeof camera->message, "%s%s", what, untold);
     camera->told_ns = now_ns;
     camera->n_untold = 0;
+    camera->later[0] = '\0';
+}
+
+/* A change of state, for people: at most one a second, so that a camera that comes and goes does not fill a disk. Of
+ * those that come too soon the last is told when its time has come: what was told last is how it stands. */
+__attribute__((format(printf, 3, 4))) static void tell(oc_live_camera_t *camera, int64_t now_ns, const char *format,
+                                                       ...)
+{
+    char what[OC_CAMERA_ERROR_BYTES];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(what, sizeof what, format, args);
+    va_end(args);
+    if (!camera->message[0] && (camera->told_ns == 0 || now_ns - camera->told_ns >= NS_PER_S)) {
+        set_message(camera, now_ns, what);
+        return;
+    }
+    if (camera->later[0]) camera->n_untold++;
+    snprintf(camera->later, sizeof camera->later, "%s", what);
+}
+
+static void tell_what_waits(oc_live_camera_t *camera, int64_t now_ns)
+{
+    char what[OC_CAMERA_ERROR_BYTES];
+    if (!camera->later[0] || camera->message[0] || now_ns - camera->told_ns < NS_PER_S) return;
+    snprintf(what, sizeof what, "%s", camera->later);
+    set_message(camera, now_ns, what);
 }
 
 /* ---- opening and closing ---- */
@@ -51,9 +67,19 @@ static void order_open(oc_live_camera_t *camera)
     oc_camera_opener_order(camera->opener, camera->index, NULL, &camera->config->wish);
 }
 
+/* One more than there is room for is one with the last. */
+static void add_mark(oc_live_camera_t *camera, int64_t mark_ns)
+{
+    if (camera->n_marks < OC_MAX_PENDING_MARKS) camera->marks_ns[camera->n_marks++] = mark_ns;
+}
+
 /* Whatever was wrong: away with it, and try again later. */
 static void order_close(oc_live_camera_t *camera)
 {
+    /* Frames that wait go with their camera; what they were to be, the next one is. */
+    for (uint32_t i = 0; i < camera->n_waiting; i++) {
+        if (camera->waiting[i].is_forced) add_mark(camera, camera->waiting[i].exposed_ns);
+    }
     camera->n_waiting = 0;
     camera->has_handed_out = false;
     camera->state = OC_CAMERA_CLOSING;
@@ -127,14 +153,13 @@ static void drop_first(oc_live_camera_t *camera)
     memmove(&camera->waiting[0], &camera->waiting[1], camera->n_waiting * sizeof camera->waiting[0]);
 }
 
-void oc_live_camera_drop_oldest(oc_live_camera_t *camera, oc_counter_t reason)
+void oc_live_camera_drop_oldest(oc_live_camera_t *camera, oc_counter_t reason, int64_t now_ns)
 {
     const oc_waiting_frame_t first = camera->waiting[0];
     count(camera, reason, 1);
     drop_first(camera);
-    /* What an unlucky frame was to be, the next one is. */
     if (first.is_forced) oc_live_camera_mark(camera, first.exposed_ns);
-    (void)give_back(camera, first.frame.index, first.arrived_ns);
+    (void)give_back(camera, first.frame.index, now_ns);
 }
 
 void oc_live_camera_mark(oc_live_camera_t *camera, int64_t mark_ns)
@@ -144,8 +169,19 @@ void oc_live_camera_mark(oc_live_camera_t *camera, int64_t mark_ns)
         camera->waiting[i].is_forced = true;
         return;
     }
-    if (!camera->has_mark) camera->mark_ns = mark_ns;
-    camera->has_mark = true;
+    add_mark(camera, mark_ns);
+}
+
+/* Whether a mark was waiting for a frame of this time; one frame may answer several. */
+static bool take_marks(oc_live_camera_t *camera, int64_t exposed_ns)
+{
+    uint32_t n = 0;
+    const uint32_t n_before = camera->n_marks;
+    for (uint32_t i = 0; i < n_before; i++) {
+        if (camera->marks_ns[i] > exposed_ns) camera->marks_ns[n++] = camera->marks_ns[i];
+    }
+    camera->n_marks = n;
+    return n < n_before;
 }
 
 static void count_gap(oc_live_camera_t *camera, uint32_t sequence)
@@ -198,13 +234,11 @@ static int64_t exposed_at(const oc_live_camera_t *camera, const oc_video_frame_t
 static void add_waiting(oc_live_camera_t *camera, const oc_waiting_frame_t *fresh)
 {
     const uint32_t limit = camera->mode.n_buffers - 3u < OC_MAX_WAITING ? camera->mode.n_buffers - 3u : OC_MAX_WAITING;
-    if (camera->n_waiting == limit) oc_live_camera_drop_oldest(camera, OC_COUNT_FRAMES_OVERRUN);
+    if (camera->n_waiting == limit) oc_live_camera_drop_oldest(camera, OC_COUNT_FRAMES_OVERRUN, fresh->arrived_ns);
     if (camera->state != OC_CAMERA_STREAMING) return;
     oc_waiting_frame_t *slot = &camera->waiting[camera->n_waiting++];
     *slot = *fresh;
-    if (!camera->has_mark || slot->exposed_ns < camera->mark_ns) return;
-    slot->is_forced = true;
-    camera->has_mark = false;
+    slot->is_forced = take_marks(camera, slot->exposed_ns);
 }
 
 static void take_in(oc_live_camera_t *camera, const oc_video_frame_t *frame, int64_t now_ns,
@@ -247,6 +281,7 @@ static void take_frames(oc_live_camera_t *camera, int64_t now_ns, const oc_clock
 
 void oc_live_camera_serve(oc_live_camera_t *camera, int64_t now_ns, const oc_clock_map_t *clock)
 {
+    tell_what_waits(camera, now_ns);
     if (camera->state == OC_CAMERA_OPENING || camera->state == OC_CAMERA_CLOSING) collect(camera, now_ns);
     if (camera->state == OC_CAMERA_CLOSED && now_ns >= camera->next_try_ns) order_open(camera);
     if (camera->state != OC_CAMERA_STREAMING) return;
@@ -263,7 +298,7 @@ void oc_live_camera_serve(oc_live_camera_t *camera, int64_t now_ns, const oc_clo
     }
 }
 
-bool oc_live_camera_hand_out(oc_live_camera_t *camera, oc_raw_image_t *raw)
+bool oc_live_camera_hand_out(oc_live_camera_t *camera, int64_t now_ns, oc_raw_image_t *raw)
 {
     const oc_video_wish_t *wish = &camera->config->wish;
     const oc_video_frame_t *frame = &camera->waiting[0].frame;
@@ -272,7 +307,7 @@ bool oc_live_camera_hand_out(oc_live_camera_t *camera, oc_raw_image_t *raw)
         char error[160];
         if (!oc_mjpeg_decode(camera->mjpeg, frame->bytes, frame->n_bytes, &image, error, sizeof error)) {
             camera->counts.corrupt++;
-            oc_live_camera_drop_oldest(camera, OC_COUNT_FRAMES_CORRUPT);
+            oc_live_camera_drop_oldest(camera, OC_COUNT_FRAMES_CORRUPT, now_ns);
             return false;
         }
         *raw = oc_raw_from_image(&image);
@@ -294,9 +329,11 @@ bool oc_live_camera_hand_out(oc_live_camera_t *camera, oc_raw_image_t *raw)
 
 int64_t oc_live_camera_wake_ns(const oc_live_camera_t *camera)
 {
-    if (camera->state == OC_CAMERA_CLOSED) return camera->next_try_ns;
-    if (camera->state == OC_CAMERA_STREAMING) return camera->last_frame_ns + camera->config->stall_ms * NS_PER_MS;
-    return INT64_MAX;
+    int64_t at_ns = camera->later[0] ? camera->told_ns + NS_PER_S : INT64_MAX;
+    if (camera->state == OC_CAMERA_CLOSED && camera->next_try_ns < at_ns) at_ns = camera->next_try_ns;
+    const int64_t stalled_ns = camera->last_frame_ns + camera->config->stall_ms * NS_PER_MS;
+    if (camera->state == OC_CAMERA_STREAMING && stalled_ns < at_ns) at_ns = stalled_ns;
+    return at_ns;
 }
 
 /* ---- telling ---- */

@@ -11,6 +11,9 @@
 /* Frames that wait: all buffers but the one handed out and two that the driver must have. */
 #define OC_MAX_WAITING 13u
 
+/* Marks whose frame has not come. */
+#define OC_MAX_PENDING_MARKS 8u
+
 typedef enum oc_camera_state {
     OC_CAMERA_CLOSED,  /* tried again at next_try_ns */
     OC_CAMERA_OPENING, /* with the opener */
@@ -50,13 +53,14 @@ typedef struct oc_live_camera {
 
     bool has_sequence;
     uint32_t last_sequence;
-    int64_t last_exposed_ns; /* INT64_MIN = none */
-    bool has_mark;
-    int64_t mark_ns;
+    int64_t last_exposed_ns;                /* INT64_MIN = none */
+    int64_t marks_ns[OC_MAX_PENDING_MARKS]; /* no frame at or after these yet */
+    uint32_t n_marks;
     oc_camera_counts_t counts;
 
     char error[OC_CAMERA_ERROR_BYTES];        /* the last one, "" while all is well */
     char message[OC_CAMERA_ERROR_BYTES + 64]; /* to be told, "" = none */
+    char later[OC_CAMERA_ERROR_BYTES];        /* the last change that came too soon after another, "" = none */
     int64_t told_ns;
     uint32_t n_untold;
 } oc_live_camera_t;
@@ -69,10 +73,10 @@ void oc_live_camera_serve(oc_live_camera_t *camera, int64_t now_ns, const oc_clo
 void oc_live_camera_mark(oc_live_camera_t *camera, int64_t mark_ns);
 
 /* Drop the oldest waiting frame, for a reason. */
-void oc_live_camera_drop_oldest(oc_live_camera_t *camera, oc_counter_t reason);
+void oc_live_camera_drop_oldest(oc_live_camera_t *camera, oc_counter_t reason, int64_t now_ns);
 
 /* Hand out the oldest waiting frame's pixels; false when it is corrupt: then it has been dropped and counted. */
-bool oc_live_camera_hand_out(oc_live_camera_t *camera, oc_raw_image_t *raw);
+bool oc_live_camera_hand_out(oc_live_camera_t *camera, int64_t now_ns, oc_raw_image_t *raw);
 
 /* When it wants to be served at the latest, but for frames. */
 int64_t oc_live_camera_wake_ns(const oc_live_camera_t *camera);
