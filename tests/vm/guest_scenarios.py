@@ -337,7 +337,7 @@ class GpioGroup(Group):
     def depot(self):
         """The depot's views arrive as frames, each with its pose, and leave as views."""
         gpio = {"enable": {"line": "enable"}, "mark": {"line": "mark", "debounce_ms": 10}}
-        views = range(0, len(self.centres), 2)
+        views = range(len(self.centres))
         self.chip.pull("enable", False)
         with Tap(self.programs) as tap, self.one_camera(gpio, stored_views=32) as daemon:
             for n, k in enumerate(views):
