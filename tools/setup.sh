@@ -11,14 +11,14 @@ die() { printf 'setup: %s\n' "$*" >&2; exit 1; }
 
 packages=(
     build-essential cmake ninja-build ccache pkg-config clang-format-14
-    libglib2.0-dev libgpiod-dev libcyaml-dev libyaml-dev libjansson-dev libjpeg62-turbo-dev libpng-dev libwebp-dev zlib1g-dev libzip-dev
+    libglib2.0-dev libgpiod-dev libsystemd-dev libcyaml-dev libyaml-dev libjansson-dev libjpeg62-turbo-dev libpng-dev libwebp-dev zlib1g-dev libzip-dev
     libopencv-core-dev libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-features2d-dev libopencv-calib3d-dev
     libeigen3-dev libceres-dev libnanoflann-dev nlohmann-json3-dev libcli11-dev
     libgtest-dev libgmock-dev libbenchmark-dev
     gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static
     clang-14 libclang-rt-14-dev valgrind
     ffmpeg iproute2 util-linux
-    qemu-system-x86 busybox-static kmod cpio libelf1 systemd udev v4l-utils
+    qemu-system-x86 busybox-static kmod cpio libelf1 systemd udev v4l-utils groff-base
     python3 python3-pip python3-numpy
     ca-certificates debian-archive-keyring dpkg-dev xz-utils
 )

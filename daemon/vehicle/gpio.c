@@ -28,6 +28,9 @@
 /* Trigger pulses remembered for the frames that follow them. */
 #define N_PULSES 64u
 
+/* Edges taken at a time: an input that swings without end must not hold up the outputs. */
+#define MAX_EDGES 64
+
 /* What the thread has to do, each at its time. */
 typedef enum due {
     DUE_TRIGGER_ON,
@@ -58,7 +61,7 @@ struct oc_gpio {
     /* The thread's own. */
     int64_t due_ns[N_DUE];
     bool is_heartbeat_on;
-    int64_t last_mark_ns;
+    int64_t last_mark_edge_ns; /* up or down */
 
     pthread_mutex_t lock; /* of what follows */
     bool has_mark;
@@ -103,27 +106,61 @@ static void note_fault(oc_gpio_t *gpio, role_t role)
     fprintf(stderr, "outcropd: gpio %s: the line does not answer any more\n", role_names[role]);
 }
 
-static void set_line(oc_gpio_t *gpio, role_t role, bool is_active)
+static bool set_line(oc_gpio_t *gpio, role_t role, bool is_active)
 {
-    if (!gpio->lines[role]) return;
-    if (gpio->ops->set(gpio->lines[role], is_active)) {
-        gpio->is_faulty[role] = false;
-    } else {
+    if (!gpio->ops->set(gpio->lines[role], is_active)) {
         note_fault(gpio, role);
+        return false;
     }
+    gpio->is_faulty[role] = false;
+    return true;
 }
 
 /* ---- outputs ---- */
 
+static void count_missed(oc_gpio_t *gpio, int64_t n)
+{
+    if (n > 0) oc_counters_add(gpio->counters, OC_COUNT_PULSES_MISSED, (uint32_t)n);
+}
+
+/* One that still waits for its delay is not put off: frames that keep coming would put it off for ever. */
+static void strobe_after(oc_gpio_t *gpio, int64_t begin_ns)
+{
+    int64_t *due_ns = &gpio->due_ns[DUE_STROBE_ON];
+    if (!gpio->lines[ROLE_STROBE]) return;
+    count_missed(gpio, *due_ns != NEVER);
+    if (*due_ns == NEVER) *due_ns = begin_ns + gpio->config.strobe_delay_us * NS_PER_US;
+}
+
+/* Not while the pulse before lasts: a camera would see no edge, a lamp would burn too long. */
+static void strobe_on(oc_gpio_t *gpio)
+{
+    gpio->due_ns[DUE_STROBE_ON] = NEVER;
+    count_missed(gpio, gpio->due_ns[DUE_STROBE_OFF] != NEVER);
+    if (gpio->due_ns[DUE_STROBE_OFF] != NEVER) return;
+    (void)set_line(gpio, ROLE_STROBE, true);
+    gpio->due_ns[DUE_STROBE_OFF] = now_ns() + gpio->config.strobe_pulse_us * NS_PER_US;
+}
+
+static void forget_pulse(oc_gpio_t *gpio)
+{
+    pthread_mutex_lock(&gpio->lock);
+    gpio->pulses_ns[--gpio->n_pulses % N_PULSES] = NEVER;
+    pthread_mutex_unlock(&gpio->lock);
+}
+
+/* Dated and remembered before the line is set, so that no frame comes before its pulse. */
 static void pulse_begin(oc_gpio_t *gpio)
 {
-    set_line(gpio, ROLE_TRIGGER, true);
+    count_missed(gpio, gpio->due_ns[DUE_TRIGGER_OFF] != NEVER);
+    if (gpio->due_ns[DUE_TRIGGER_OFF] != NEVER) return;
     const int64_t begin_ns = now_ns();
     pthread_mutex_lock(&gpio->lock);
     gpio->pulses_ns[gpio->n_pulses++ % N_PULSES] = begin_ns;
     pthread_mutex_unlock(&gpio->lock);
-    gpio->due_ns[DUE_TRIGGER_OFF] = begin_ns + gpio->config.trigger_pulse_us * NS_PER_US;
-    if (gpio->lines[ROLE_STROBE]) gpio->due_ns[DUE_STROBE_ON] = begin_ns + gpio->config.strobe_delay_us * NS_PER_US;
+    if (!set_line(gpio, ROLE_TRIGGER, true)) forget_pulse(gpio);
+    gpio->due_ns[DUE_TRIGGER_OFF] = now_ns() + gpio->config.trigger_pulse_us * NS_PER_US;
+    strobe_after(gpio, begin_ns);
 }
 
 /* A pulse that is a whole period late is not given: the camera would be exposed at a time that nobody asked for. */
@@ -137,7 +174,7 @@ static void trigger_on(oc_gpio_t *gpio, int64_t now)
     }
     const int64_t period_ns = (int64_t)((double)NS_PER_S / gpio->config.trigger_rate_hz);
     const int64_t n_late = (now - *due_ns) / period_ns;
-    if (n_late > 0) oc_counters_add(gpio->counters, OC_COUNT_PULSES_MISSED, (uint32_t)n_late);
+    count_missed(gpio, n_late);
     *due_ns += (n_late + 1) * period_ns;
     pulse_begin(gpio);
 }
@@ -147,7 +184,7 @@ static void heartbeat(oc_gpio_t *gpio, int64_t now)
     const int64_t last_ns = atomic_load(&gpio->last_frame_ns);
     const bool is_alive = last_ns != 0 && now - last_ns < HEARTBEAT_PATIENCE_NS;
     gpio->is_heartbeat_on = is_alive && !gpio->is_heartbeat_on;
-    set_line(gpio, ROLE_HEARTBEAT, gpio->is_heartbeat_on);
+    (void)set_line(gpio, ROLE_HEARTBEAT, gpio->is_heartbeat_on);
     gpio->due_ns[DUE_HEARTBEAT] = now + gpio->config.heartbeat_ms * NS_PER_MS;
 }
 
@@ -171,12 +208,13 @@ static void reread_enable(oc_gpio_t *gpio)
     set_enabled(gpio, level == 1);
 }
 
+/* A contact bounces when it opens as well: any edge that was close makes this one part of the same stroke. */
 static void take_mark_edge(oc_gpio_t *gpio, const oc_gpio_edge_t *edge)
 {
+    const int64_t last_ns = gpio->last_mark_edge_ns;
+    gpio->last_mark_edge_ns = edge->mono_ns;
     if (!edge->is_active) return;
-    if (gpio->last_mark_ns != 0 && edge->mono_ns - gpio->last_mark_ns < gpio->config.mark_debounce_ms * NS_PER_MS)
-        return;
-    gpio->last_mark_ns = edge->mono_ns;
+    if (last_ns != 0 && edge->mono_ns - last_ns < gpio->config.mark_debounce_ms * NS_PER_MS) return;
     pthread_mutex_lock(&gpio->lock);
     const bool is_dropped = gpio->has_mark;
     if (!is_dropped) gpio->mark_ns = edge->mono_ns;
@@ -189,16 +227,24 @@ static void take_mark_edge(oc_gpio_t *gpio, const oc_gpio_edge_t *edge)
 /* False when the line is dead and need not be polled any more. */
 static bool take_edges(oc_gpio_t *gpio, role_t role)
 {
-    for (;;) {
-        oc_gpio_edge_t edge;
-        const oc_gpio_result_t result = gpio->ops->take_edge(gpio->lines[role], &edge);
-        if (result == OC_GPIO_FAULT) note_fault(gpio, role);
-        if (result != OC_GPIO_EDGE) {
-            if (role == ROLE_ENABLE) reread_enable(gpio);
-            return result == OC_GPIO_NONE;
-        }
-        if (role == ROLE_MARK) take_mark_edge(gpio, &edge);
+    oc_gpio_edge_t edge;
+    oc_gpio_result_t result = OC_GPIO_EDGE;
+    for (int i = 0; i < MAX_EDGES && result == OC_GPIO_EDGE; i++) {
+        result = gpio->ops->take_edge(gpio->lines[role], &edge);
+        if (result == OC_GPIO_EDGE && role == ROLE_MARK) take_mark_edge(gpio, &edge);
     }
+    if (role == ROLE_ENABLE) reread_enable(gpio);
+    return result != OC_GPIO_FAULT;
+}
+
+/* Where a line's chip went away, poll would come back at once for ever. */
+static void serve_input(oc_gpio_t *gpio, role_t role, struct pollfd *fd)
+{
+    if (!fd->revents) return;
+    const bool is_gone = (fd->revents & (POLLERR | POLLHUP | POLLNVAL)) != 0;
+    if (take_edges(gpio, role) && !is_gone) return;
+    note_fault(gpio, role);
+    fd->fd = -1;
 }
 
 /* ---- the thread ---- */
@@ -207,12 +253,9 @@ static void carry_out(oc_gpio_t *gpio, due_t due, int64_t now)
 {
     switch (due) {
     case DUE_TRIGGER_ON: trigger_on(gpio, now); return;
-    case DUE_TRIGGER_OFF: set_line(gpio, ROLE_TRIGGER, false); break;
-    case DUE_STROBE_ON:
-        set_line(gpio, ROLE_STROBE, true);
-        gpio->due_ns[DUE_STROBE_OFF] = now_ns() + gpio->config.strobe_pulse_us * NS_PER_US;
-        break;
-    case DUE_STROBE_OFF: set_line(gpio, ROLE_STROBE, false); break;
+    case DUE_TRIGGER_OFF: (void)set_line(gpio, ROLE_TRIGGER, false); break;
+    case DUE_STROBE_ON: strobe_on(gpio); return;
+    case DUE_STROBE_OFF: (void)set_line(gpio, ROLE_STROBE, false); break;
     case DUE_HEARTBEAT: heartbeat(gpio, now); return;
     case DUE_REREAD:
         reread_enable(gpio);
@@ -238,8 +281,8 @@ static void on_command(oc_gpio_t *gpio)
     if (!atomic_exchange(&gpio->has_frame, false)) return;
     if (gpio->lines[ROLE_TRIGGER]) {
         if (gpio->config.trigger_mode == OC_TRIGGER_PER_FRAME) gpio->due_ns[DUE_TRIGGER_ON] = now_ns();
-    } else if (gpio->lines[ROLE_STROBE]) {
-        gpio->due_ns[DUE_STROBE_ON] = now_ns() + gpio->config.strobe_delay_us * NS_PER_US;
+    } else {
+        strobe_after(gpio, now_ns());
     }
 }
 
@@ -263,9 +306,7 @@ static void *thread_main(void *user)
         const struct timespec timeout = {wait_ns / NS_PER_S, wait_ns % NS_PER_S};
         if (ppoll(fds, 3, &timeout, NULL) <= 0) continue;
         if (fds[0].revents) on_command(gpio);
-        for (int i = 1; i < 3; i++) {
-            if (fds[i].revents && !take_edges(gpio, inputs[i])) fds[i].fd = -1;
-        }
+        for (int i = 1; i < 3; i++) serve_input(gpio, inputs[i], &fds[i]);
     }
     return NULL;
 }
@@ -304,8 +345,12 @@ static bool gpio_open(oc_gpio_t *gpio, char *error, size_t error_bytes)
         return false;
     }
     if (!open_lines(gpio, error, error_bytes)) return false;
-    atomic_store(&gpio->is_enabled, true);
-    reread_enable(gpio);
+    const int level = gpio->lines[ROLE_ENABLE] ? gpio->ops->get(gpio->lines[ROLE_ENABLE]) : 1;
+    if (level < 0) {
+        snprintf(error, error_bytes, "gpio enable: the level of the line cannot be read");
+        return false;
+    }
+    atomic_store(&gpio->is_enabled, level == 1);
     schedule(gpio);
     const int failed = pthread_create(&gpio->thread, NULL, thread_main, gpio);
     if (failed) snprintf(error, error_bytes, "cannot start the thread of the lines: %s", strerror(failed));
@@ -381,13 +426,14 @@ void oc_gpio_frame(oc_gpio_t *gpio)
     const bool is_awaited = gpio->lines[ROLE_TRIGGER] ? gpio->config.trigger_mode == OC_TRIGGER_PER_FRAME
                                                       : gpio->lines[ROLE_STROBE] != NULL;
     if (!is_awaited) return;
-    atomic_store(&gpio->has_frame, true);
+    count_missed(gpio, atomic_exchange(&gpio->has_frame, true)); /* the thread has not come round to the one before */
     signal_fd(gpio->command_fd);
 }
 
 bool oc_gpio_pulse_of(const oc_gpio_t *gpio, int64_t mono_ns, int64_t *pulse_ns)
 {
     oc_gpio_t *g = (oc_gpio_t *)(uintptr_t)gpio;
+    if (g->config.trigger_mode != OC_TRIGGER_PERIODIC) return false;
     const int64_t period_ns = (int64_t)((double)NS_PER_S / g->config.trigger_rate_hz);
     bool is_found = false;
     pthread_mutex_lock(&g->lock);

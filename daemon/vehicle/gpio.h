@@ -14,7 +14,7 @@
 
 /* What starts a trigger pulse. */
 typedef enum oc_trigger_mode {
-    OC_TRIGGER_PER_FRAME, /* a frame has come: others follow the camera */
+    OC_TRIGGER_PER_FRAME, /* a frame has come: others follow the camera; none while the pulse before lasts */
     OC_TRIGGER_PERIODIC   /* a clock: hardware-triggered cameras follow the line */
 } oc_trigger_mode_t;
 
@@ -26,7 +26,7 @@ typedef struct oc_gpio_config {
     uint32_t strobe_delay_us;  /* after the start of the trigger pulse or the arrival of the frame; 0..100000 */
     uint32_t strobe_pulse_us;  /* 10..100000 */
     uint32_t heartbeat_ms;     /* half a period of the LED, 50..10000; still when frames stop coming */
-    uint32_t mark_debounce_ms; /* edges closer than this are one mark, 0..10000 */
+    uint32_t mark_debounce_ms; /* no mark this soon after another edge of the line, up or down; 0..10000 */
 } oc_gpio_config_t;
 
 typedef struct oc_gpio oc_gpio_t;
@@ -49,11 +49,13 @@ bool oc_gpio_is_enabled(const oc_gpio_t *gpio);
  * faster than they are taken become one, the first, and are counted. */
 bool oc_gpio_take_mark(oc_gpio_t *gpio, int64_t *mono_ns);
 
-/* A frame has come: per-frame trigger, strobe, heartbeat. Does not block. */
+/* A frame has come: per-frame trigger, strobe, heartbeat. Does not block. One
+ * that comes before the last one's pulse was over starts none: PULSES_MISSED. */
 void oc_gpio_frame(oc_gpio_t *gpio);
 
 /* Periodic trigger: the start of the pulse that belongs to a frame which came
- * at mono_ns, the last one before it within a period. False when there is none. */
+ * at mono_ns, the last one before it within a period. False when there is none,
+ * and per frame, where the frame comes first. */
 bool oc_gpio_pulse_of(const oc_gpio_t *gpio, int64_t mono_ns, int64_t *pulse_ns);
 
 #endif

@@ -171,7 +171,9 @@ static oc_gpio_result_t line_take_edge(oc_gpio_line_t *line, oc_gpio_edge_t *edg
 {
     struct gpiod_line_event event;
     errno = 0;
-    if (gpiod_line_event_read(line->line, &event) < 0) return errno == EAGAIN ? OC_GPIO_NONE : OC_GPIO_FAULT;
+    if (gpiod_line_event_read(line->line, &event) < 0) {
+        return errno == EAGAIN || errno == EINTR ? OC_GPIO_NONE : OC_GPIO_FAULT;
+    }
     /* The kernel has turned an active-low line round already. */
     *edge = (oc_gpio_edge_t){.is_active = event.event_type == GPIOD_LINE_EVENT_RISING_EDGE,
                              .mono_ns = (int64_t)event.ts.tv_sec * 1000000000 + event.ts.tv_nsec};

@@ -89,6 +89,14 @@ static void angle_rows(const oc_pose_t *cam_from_world, double rows[9])
     memcpy(rows, inverse, sizeof inverse);
 }
 
+/* Next to 90 degrees phi shrinks whichever way the view strays, also across its own direction: by b^2 / (2 cos phi)
+ * while b is small, by all of b in the end. b cos^-1 phi is what turns kappa. */
+static double sigma_of_phi(double along, double sigma_of_kappa, double cos_phi)
+{
+    const double across = sigma_of_kappa * cos_phi;
+    return hypot(along, across * fmin(1, sigma_of_kappa));
+}
+
 oc_margin_t oc_margin_of_camera(const oc_body_pose_t *body, const oc_pose_t *body_from_optical,
                                 const oc_margin_t *least)
 {
@@ -104,8 +112,11 @@ oc_margin_t oc_margin_of_camera(const oc_body_pose_t *body, const oc_pose_t *bod
     const double rows[6][6] = {{1, 0, 0, 0, lever[2], -lever[1]},          {0, 1, 0, -lever[2], 0, lever[0]},
                                {0, 0, 1, lever[1], -lever[0], 0},          {0, 0, 0, angles[0], angles[1], angles[2]},
                                {0, 0, 0, angles[3], angles[4], angles[5]}, {0, 0, 0, angles[6], angles[7], angles[8]}};
+    double sigma[6];
+    for (int i = 0; i < 6; i++) sigma[i] = sigma_of(rows[i], body->covariance);
+    sigma[4] = sigma_of_phi(sigma[4], sigma[5], 1 / hypot(angles[7], angles[8]));
     for (int i = 0; i < 6; i++) {
-        double half = sqrt(3.0) * sigma_of(rows[i], body->covariance);
+        double half = sqrt(3.0) * sigma[i];
         if (i >= 3) half = fmin(half, MAX_ANGLE_MARGIN);
         margin.v[i] = fmax(margin.v[i], half);
     }

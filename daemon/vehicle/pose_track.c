@@ -9,11 +9,25 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+/* So many poses in a row that are too old, each newer than the one before: the publisher's clock was set back. */
+#define MAX_LATE 10u
+
+/* Farther from the origin, or farther off in time, nothing is real and sums could overflow. */
+#define MAX_POSITION_M 1e9
+#define MAX_UTIME_US (INT64_MAX / 4)
+#define MAX_VARIANCE 1e30
+
+/* What may be rounding, for publishers that work in single precision: of a variance, and of correlations. */
+#define ROUNDING 1e-7
+#define SLACK 1e-6
+
 struct oc_pose_track {
     pthread_mutex_t lock;
     int added_fd;
     int64_t max_gap_us;
     uint32_t capacity, first, n;
+    uint32_t n_late; /* in a row */
+    int64_t last_late_us;
     oc_body_pose_t *ring;
 };
 
@@ -56,28 +70,55 @@ void oc_pose_track_clear(oc_pose_track_t *track)
 
 /* ---- adding ---- */
 
-/* Symmetric and, by Cholesky with some slack for rounding, without a negative direction. */
+/* Correlations, so that metres and radians are judged alike. A variance that is next to nothing beside the others of its
+ * kind may be rounding and is judged as if it were a little more. False when one is negative or too large, or the matrix
+ * is not symmetric. */
+static bool to_correlations(const double c[36], double r[36])
+{
+    double sigma[6];
+    for (int i = 0; i < 6; i++) {
+        const double *kind = i < 3 ? &c[0] : &c[21];
+        const double least = ROUNDING * fmax(kind[0], fmax(kind[7], kind[14]));
+        if (!(c[7 * i] >= -least && c[7 * i] <= MAX_VARIANCE)) return false;
+        sigma[i] = sqrt(fmax(c[7 * i], least));
+    }
+    for (int i = 0; i < 36; i++) {
+        const double scale = sigma[i / 6] * sigma[i % 6];
+        if (!(fabs(c[i]) <= 1.001 * scale)) return false;
+        r[i] = scale > 0 ? c[i] / scale : 0;
+    }
+    for (int i = 0; i < 36; i++) {
+        if (fabs(r[i] - r[6 * (i % 6) + i / 6]) > SLACK) return false;
+    }
+    for (int i = 0; i < 6; i++) r[7 * i] = fmax(0, r[7 * i]);
+    return true;
+}
+
+/* No direction of the remaining rows varies: then none may be negative or correlate. */
+static bool is_spent(const double r[36], const bool is_done[6])
+{
+    for (int i = 0; i < 36; i++) {
+        if (is_done[i / 6] || is_done[i % 6]) continue;
+        if (i % 7 == 0 ? r[i] < -SLACK : fabs(r[i]) > 4 * SLACK) return false;
+    }
+    return true;
+}
+
+/* Symmetric and without a negative direction: what varies most is taken out, until nothing varies. */
 static bool is_covariance(const double c[36])
 {
-    double l[36] = {0}, largest = 0;
-    for (int i = 0; i < 36; i++) {
-        if (!isfinite(c[i])) return false;
-        largest = fmax(largest, fabs(c[i]));
-    }
-    const double slack = 1e-9 * largest;
-    for (int i = 0; i < 6; i++) {
-        for (int j = 0; j <= i; j++) {
-            if (fabs(c[6 * i + j] - c[6 * j + i]) > slack) return false;
-            double sum = c[6 * i + j];
-            for (int k = 0; k < j; k++) sum -= l[6 * i + k] * l[6 * j + k];
-            if (i == j) {
-                if (sum < -slack) return false;
-                l[6 * i + i] = sum > slack ? sqrt(sum) : 0;
-            } else if (l[6 * j + j] > 0) {
-                l[6 * i + j] = sum / l[6 * j + j];
-            } else if (fabs(sum) > 1e-4 * largest) { /* correlated with what does not vary */
-                return false;
-            }
+    double r[36];
+    bool is_done[6] = {false};
+    if (!to_correlations(c, r)) return false;
+    for (int step = 0; step < 6; step++) {
+        int p = -1;
+        for (int i = 0; i < 6; i++) {
+            if (!is_done[i] && (p < 0 || r[7 * i] > r[7 * p])) p = i;
+        }
+        if (r[7 * p] <= SLACK) return is_spent(r, is_done);
+        is_done[p] = true;
+        for (int i = 0; i < 36; i++) {
+            if (!is_done[i / 6] && !is_done[i % 6]) r[i] -= r[6 * (i / 6) + p] * r[6 * p + i % 6] / r[7 * p];
         }
     }
     return true;
@@ -86,8 +127,9 @@ static bool is_covariance(const double c[36])
 static bool is_pose(const oc_body_pose_t *pose)
 {
     double norm = 0;
+    if (pose->utime_us > MAX_UTIME_US || pose->utime_us < -MAX_UTIME_US) return false;
     for (int i = 0; i < 3; i++) {
-        if (!isfinite(pose->position_m[i])) return false;
+        if (!(fabs(pose->position_m[i]) <= MAX_POSITION_M)) return false;
     }
     for (int i = 0; i < 4; i++) norm += pose->q_wxyz[i] * pose->q_wxyz[i];
     if (!(fabs(sqrt(norm) - 1) <= 1e-3)) return false;
@@ -99,12 +141,23 @@ static oc_body_pose_t *nth(const oc_pose_track_t *track, uint32_t i)
     return &track->ring[(track->first + i) % track->capacity];
 }
 
+/* Single late ones are dropped; but a clock that was set back must not silence the publisher until it has caught up. */
+static bool clock_was_set_back(oc_pose_track_t *track, int64_t utime_us)
+{
+    if (track->n == 0 || utime_us > nth(track, track->n - 1u)->utime_us) return false;
+    track->n_late = track->n_late == 0 || utime_us > track->last_late_us ? track->n_late + 1u : 1u;
+    track->last_late_us = utime_us;
+    return track->n_late > MAX_LATE;
+}
+
 oc_status_t oc_pose_track_add(oc_pose_track_t *track, const oc_body_pose_t *pose)
 {
     if (!is_pose(pose)) return OC_E_ARG;
     pthread_mutex_lock(&track->lock);
+    if (clock_was_set_back(track, pose->utime_us)) track->n = 0;
     const bool is_newer = track->n == 0 || pose->utime_us > nth(track, track->n - 1u)->utime_us;
     if (is_newer) {
+        track->n_late = 0;
         if (track->n == track->capacity) {
             track->first = (track->first + 1u) % track->capacity;
             track->n--;

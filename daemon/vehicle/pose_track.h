@@ -39,9 +39,11 @@ void oc_pose_track_destroy(oc_pose_track_t *track);
 int oc_pose_track_fd(const oc_pose_track_t *track);
 void oc_pose_track_clear(oc_pose_track_t *track);
 
-/* OC_OK; OC_E_ARG when it is not a pose (not finite, not a unit quaternion
- * within 1e-3, covariance not symmetric and positive semidefinite);
- * OC_E_STATE when not newer than the last one. */
+/* OC_OK; OC_E_ARG when it is not a pose (not finite, farther than 1e9 m from
+ * the origin, not a unit quaternion within 1e-3, covariance not symmetric and
+ * positive semidefinite); OC_E_STATE when not newer than the last one. After ten
+ * of these in a row, each newer than the one before, the publisher's clock must
+ * have been set back: the track begins anew with the next. */
 OC_CHECKED oc_status_t oc_pose_track_add(oc_pose_track_t *track, const oc_body_pose_t *pose);
 
 /* The pose at a time: position linear, rotation on the shorter arc, the
@@ -66,7 +68,8 @@ oc_pose_t oc_pose_of_camera(const oc_body_pose_t *body, const oc_pose_t *body_fr
  * one sigma times sqrt 3 (a uniform error of that half-width has that sigma);
  * not smaller than `least`, which is all there is without a covariance, and
  * angles not larger than 45 degrees: where phi nears 90 degrees (a camera that
- * looks level to the east or west) omega and kappa are hardly to be told apart. */
+ * looks level to the east or west) omega and kappa are hardly to be told apart,
+ * and phi gets smaller whichever way the view strays, which is in its margin. */
 oc_margin_t oc_margin_of_camera(const oc_body_pose_t *body, const oc_pose_t *body_from_optical,
                                 const oc_margin_t *least);
 

@@ -19,6 +19,11 @@
 
 #define STATUS_PERIOD_NS 1000000000LL
 
+/* The link's pace holds on average. What could not be sent while a frame was looked at may be sent at once after it: so
+ * much time's worth, and so many datagrams, at most. */
+#define MAX_BURST_NS 250000000LL
+#define MAX_BURST 16
+
 #define NS_PER_US 1000
 
 static int64_t cpu_us(void)
@@ -198,7 +203,9 @@ static bool run_send(vehicle_run_t *run, size_t n_bytes)
     }
     run->bytes_sent += n_bytes;
     const int64_t wire_bits = 8 * (int64_t)OC_LCM_WIRE_BYTES(n_bytes, OC_CHANNEL_DOWN);
-    run->next_send_ns = oc_mono_ns() + wire_bits * 1000000 / run->config->rate_kbit_s;
+    const int64_t earliest_ns = oc_mono_ns() - MAX_BURST_NS;
+    if (run->next_send_ns < earliest_ns) run->next_send_ns = earliest_ns;
+    run->next_send_ns += wire_bits * 1000000 / run->config->rate_kbit_s;
     return true;
 }
 
@@ -348,8 +355,9 @@ static void run_loop(vehicle_run_t *run)
         }
         run_take_packets(run);
         const bool is_busy = !run->is_source_done && run_take_frame(run);
-        bool has_more = oc_mono_ns() < run->next_send_ns;
-        if (!has_more) has_more = run_send_next(run);
+        bool has_more = true;
+        for (int i = 0; has_more && i < MAX_BURST && oc_mono_ns() >= run->next_send_ns; i++)
+            has_more = run_send_next(run);
         run_wait(run, is_busy, has_more);
     }
     oc_service_stopping();

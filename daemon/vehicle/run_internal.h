@@ -26,7 +26,8 @@ typedef struct vehicle_run {
     int signal_fd;
     char fault[160]; /* why the loop ended, "" = a signal */
 
-    int64_t start_ns, next_status_ns, next_send_ns, watchdog_ns, next_alive_ns, cpu_at_start_us;
+    int64_t start_ns, next_status_ns, next_send_ns /* earlier than now: unused pace */, watchdog_ns, next_alive_ns,
+        cpu_at_start_us;
     bool is_source_done, is_stopped, is_hangup_told, is_status_fault_told, is_frame_fault_told;
     uint32_t forced_cameras; /* bit i: the next frame of camera i is marked */
     int64_t newest_utime_us; /* of the frames */

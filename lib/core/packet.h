@@ -215,7 +215,7 @@ typedef enum oc_counter {
     OC_COUNT_MARKS,           /* mark inputs taken */
     OC_COUNT_MARKS_DROPPED,   /* came faster than they were taken */
     OC_COUNT_GPIO_FAULTS,     /* a line could not be set or read */
-    OC_COUNT_PULSES_MISSED,   /* trigger pulses that were too late to give */
+    OC_COUNT_PULSES_MISSED,   /* trigger or strobe pulses: too late, or while the one before lasted */
     OC_COUNT_PACKETS_BAD,     /* received, no packet of ours */
     OC_COUNT_PACKETS_FOREIGN, /* received, for another vehicle */
     OC_COUNT_PACKETS_FULL,    /* received, no room to queue them */

@@ -237,8 +237,8 @@ def check_base_leaves_with_what_it_has(s):
     base.write_text(yaml(changed(s.base_keys, {"as": "none"})))
     vehicle.write_text(yaml(changed(s.vehicle_keys, {"source.period_ms": "60000"})))  # one view, then a long wait
     process = subprocess.Popen(["unshare", "-rn", "--kill-child", "sh", "-c", lo + f"""
-        {s.base} live --config {base} & base=$!; {s.outcropd} --config {vehicle} >/dev/null & vehicle=$!
-        sleep 1.5; kill $base; wait $base; code=$?; kill $vehicle; exit $code"""],
+        {s.base} live --config {base} & base=$!; {s.outcropd} --config {vehicle} >{s.scratch}/told & vehicle=$!
+        until grep -q "view 0" {s.scratch}/told; do sleep 0.1; done; sleep 3; kill $base; wait $base; code=$?; kill $vehicle; exit $code"""],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     out, err = process.communicate(timeout=60)
     check(process.returncode == 0, out, err)

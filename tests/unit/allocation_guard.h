@@ -20,7 +20,7 @@ static inline void guard_check(void)
     abort();
 }
 
-#ifdef __SANITIZE_ADDRESS__ /* whose own allocator has hooks */
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) /* whose own allocators have hooks */
 
 extern int __sanitizer_install_malloc_and_free_hooks(void (*on_malloc)(const volatile void *, size_t),
                                                      void (*on_free)(const volatile void *));
