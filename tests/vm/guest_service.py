@@ -7,7 +7,8 @@ import shutil
 import signal
 import time
 
-from guest_kit import DOWN, POSES, UP, Failed, Poses, UsbCamera, camera_section, expect, run, site_views, wait_for, write_calibration
+from guest_kit import (DOWN, POSES, UP, Failed, Poses, UsbCamera, camera_section, expect, run, site_views, wait_for,
+                       write_calibration)
 
 UNIT = "outcropd.service"
 
@@ -24,7 +25,7 @@ def process_state(pid, key):
 
 
 class ServiceGroup:
-    """BUILD/../vm_installed holds what cmake --install made; here it becomes part of the machine."""
+    """$OUTCROP_VM_INSTALLED holds what cmake --install made; here it becomes part of the machine."""
 
     def __init__(self, build, site, frames):
         self.installed, self.site = pathlib.Path(os.environ["OUTCROP_VM_INSTALLED"]), site
