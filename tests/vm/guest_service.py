@@ -7,8 +7,8 @@ import shutil
 import signal
 import time
 
-from guest_kit import SCRATCH, DOWN, POSES, UP, Poses, UsbCamera, camera_section, expect, run, site_views, wait_for, \
-    write_calibration
+from guest_kit import (DOWN, POSES, UP, Failed, Poses, UsbCamera, camera_section, expect, run, site_views, wait_for,
+                       write_calibration)
 
 UNIT = "outcropd.service"
 
@@ -25,7 +25,7 @@ def process_state(pid, key):
 
 
 class ServiceGroup:
-    """BUILD/../vm_installed holds what cmake --install made; here it becomes part of the machine."""
+    """$OUTCROP_VM_INSTALLED holds what cmake --install made; here it becomes part of the machine."""
 
     def __init__(self, build, site, frames):
         self.installed, self.site = pathlib.Path(os.environ["OUTCROP_VM_INSTALLED"]), site
@@ -50,7 +50,9 @@ class ServiceGroup:
 
     @staticmethod
     def pid():
-        return int(show("MainPID"))
+        pid = int(show("MainPID"))
+        expect(pid > 0, f"the unit has no process; it is {show('ActiveState')}, {show('Result')}")
+        return pid
 
     @staticmethod
     def counters():
@@ -60,10 +62,13 @@ class ServiceGroup:
     def start(self):
         """systemctl start returns when the daemon has said that it is ready."""
         run("systemctl", "daemon-reload")
-        run("systemctl", "start", UNIT)
+        try:
+            run("systemctl", "start", UNIT)
+        except Failed:
+            raise Failed("it does not start: " + run("journalctl", "--no-pager", "-o", "cat", "-n", "12", "-u", UNIT)) from None
         expect(show("Type") == "notify", f"Type is {show('Type')}")
         expect(show("ActiveState") == "active", f"ActiveState is {show('ActiveState')}")
-        expect(self.pid() > 0, "no process")
+        self.pid()
 
     def confined(self):
         pid = self.pid()
@@ -88,7 +93,7 @@ class ServiceGroup:
         pid, restarts = self.pid(), int(show("NRestarts"))
         limit_s = int(show("WatchdogUSec").rstrip("s")) if show("WatchdogUSec").endswith("s") else 30
         os.kill(pid, signal.SIGSTOP)
-        wait_for(lambda: int(show("NRestarts")) > restarts and self.pid() not in (0, pid), limit_s + 60,
+        wait_for(lambda: int(show("NRestarts")) > restarts and show("MainPID") not in ("0", str(pid)), limit_s + 60,
                  lambda: f"a new process; {show('ActiveState')}, {show('Result')}")
         wait_for(lambda: show("ActiveState") == "active", 30, lambda: show("ActiveState"))
         self.sees_camera()
