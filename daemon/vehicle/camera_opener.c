@@ -5,8 +5,9 @@
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/eventfd.h>
 #include <unistd.h>
+
+#include "doorbell.h"
 
 typedef enum order_state { ORDER_NONE, ORDER_GIVEN, ORDER_UNDER_WAY, ORDER_DONE } order_state_t;
 
@@ -51,7 +52,6 @@ static void *thread_main(void *user)
     const opener_thread_t *thread = user;
     oc_camera_opener_t *opener = thread->opener;
     order_t *order = thread->order;
-    const uint64_t one = 1;
     pthread_mutex_lock(&opener->lock);
     while (!opener->is_stopped) {
         if (order->state != ORDER_GIVEN) {
@@ -63,7 +63,7 @@ static void *thread_main(void *user)
         carry_out(opener->ops, order);
         pthread_mutex_lock(&opener->lock);
         order->state = ORDER_DONE;
-        if (write(opener->done_fd, &one, sizeof one) < 0) continue; /* readable already */
+        oc_doorbell_ring(opener->done_fd);
     }
     pthread_mutex_unlock(&opener->lock);
     return NULL;
@@ -74,7 +74,7 @@ oc_camera_opener_t *oc_camera_opener_create(const oc_video_ops_t *ops, uint32_t 
     oc_camera_opener_t *opener = calloc(1, sizeof *opener);
     if (!opener) return NULL;
     opener->ops = ops;
-    opener->done_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    opener->done_fd = oc_doorbell_open();
     pthread_mutex_init(&opener->lock, NULL);
     pthread_cond_init(&opener->given, NULL);
     bool is_ok = opener->done_fd >= 0;
@@ -140,6 +140,5 @@ int oc_camera_opener_fd(const oc_camera_opener_t *opener)
 
 void oc_camera_opener_clear(oc_camera_opener_t *opener)
 {
-    uint64_t n;
-    if (read(opener->done_fd, &n, sizeof n) < 0) return; /* nothing to clear */
+    oc_doorbell_clear(opener->done_fd);
 }

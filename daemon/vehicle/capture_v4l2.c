@@ -11,9 +11,9 @@
 #include <sys/ioctl.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 
+#include "clock_map.h"
 #include "video_device.h"
 
 #define MAX_BUFFERS 16u
@@ -302,13 +302,6 @@ static int v4l2_fd(const oc_video_t *video)
     return video->fd;
 }
 
-static int64_t now_ns(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
-}
-
 static oc_video_result_t v4l2_take(oc_video_t *video, oc_video_frame_t *frame, char *error, size_t error_bytes)
 {
     struct v4l2_buffer buffer = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE, .memory = V4L2_MEMORY_MMAP};
@@ -329,7 +322,7 @@ static oc_video_result_t v4l2_take(oc_video_t *video, oc_video_frame_t *frame, c
                                 .sequence = buffer.sequence,
                                 .mono_ns = is_monotonic ? (int64_t)buffer.timestamp.tv_sec * 1000000000 +
                                                               (int64_t)buffer.timestamp.tv_usec * 1000
-                                                        : now_ns(),
+                                                        : oc_mono_ns(),
                                 .clock = is_monotonic ? OC_VIDEO_CLOCK_MONOTONIC : OC_VIDEO_CLOCK_ARRIVAL,
                                 .is_flagged = (buffer.flags & V4L2_BUF_FLAG_ERROR) != 0};
     return OC_VIDEO_FRAME;

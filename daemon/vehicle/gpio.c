@@ -9,10 +9,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/eventfd.h>
 #include <sys/prctl.h>
 #include <time.h>
 #include <unistd.h>
+
+#include "clock_map.h"
+#include "doorbell.h"
 
 #define NS_PER_US 1000LL
 #define NS_PER_MS 1000000LL
@@ -79,25 +81,6 @@ static const oc_gpio_name_t *name_of(const oc_gpio_config_t *config, role_t role
     return names[role];
 }
 
-static int64_t now_ns(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (int64_t)t.tv_sec * NS_PER_S + t.tv_nsec;
-}
-
-static void signal_fd(int fd)
-{
-    const uint64_t one = 1;
-    if (write(fd, &one, sizeof one) < 0) return; /* readable already */
-}
-
-static void clear_fd(int fd)
-{
-    uint64_t n;
-    if (read(fd, &n, sizeof n) < 0) return; /* nothing to clear */
-}
-
 static void note_fault(oc_gpio_t *gpio, role_t role)
 {
     if (gpio->is_faulty[role]) return;
@@ -139,7 +122,7 @@ static void strobe_on(oc_gpio_t *gpio)
     count_missed(gpio, gpio->due_ns[DUE_STROBE_OFF] != NEVER);
     if (gpio->due_ns[DUE_STROBE_OFF] != NEVER) return;
     (void)set_line(gpio, ROLE_STROBE, true);
-    gpio->due_ns[DUE_STROBE_OFF] = now_ns() + gpio->config.strobe_pulse_us * NS_PER_US;
+    gpio->due_ns[DUE_STROBE_OFF] = oc_mono_ns() + gpio->config.strobe_pulse_us * NS_PER_US;
 }
 
 static void forget_pulse(oc_gpio_t *gpio)
@@ -154,12 +137,12 @@ static void pulse_begin(oc_gpio_t *gpio)
 {
     count_missed(gpio, gpio->due_ns[DUE_TRIGGER_OFF] != NEVER);
     if (gpio->due_ns[DUE_TRIGGER_OFF] != NEVER) return;
-    const int64_t begin_ns = now_ns();
+    const int64_t begin_ns = oc_mono_ns();
     pthread_mutex_lock(&gpio->lock);
     gpio->pulses_ns[gpio->n_pulses++ % N_PULSES] = begin_ns;
     pthread_mutex_unlock(&gpio->lock);
     if (!set_line(gpio, ROLE_TRIGGER, true)) forget_pulse(gpio);
-    gpio->due_ns[DUE_TRIGGER_OFF] = now_ns() + gpio->config.trigger_pulse_us * NS_PER_US;
+    gpio->due_ns[DUE_TRIGGER_OFF] = oc_mono_ns() + gpio->config.trigger_pulse_us * NS_PER_US;
     strobe_after(gpio, begin_ns);
 }
 
@@ -192,7 +175,7 @@ static void heartbeat(oc_gpio_t *gpio, int64_t now)
 
 static void set_enabled(oc_gpio_t *gpio, bool is_enabled)
 {
-    if (atomic_exchange(&gpio->is_enabled, is_enabled) != is_enabled) signal_fd(gpio->news_fd);
+    if (atomic_exchange(&gpio->is_enabled, is_enabled) != is_enabled) oc_doorbell_ring(gpio->news_fd);
 }
 
 /* The level itself: right even when edges were lost. Without an answer the last state stays. */
@@ -221,7 +204,7 @@ static void take_mark_edge(oc_gpio_t *gpio, const oc_gpio_edge_t *edge)
     gpio->has_mark = true;
     pthread_mutex_unlock(&gpio->lock);
     if (is_dropped) oc_counters_add(gpio->counters, OC_COUNT_MARKS_DROPPED, 1);
-    signal_fd(gpio->news_fd);
+    oc_doorbell_ring(gpio->news_fd);
 }
 
 /* False when the line is dead and need not be polled any more. */
@@ -277,12 +260,12 @@ static due_t next_due(const oc_gpio_t *gpio)
 
 static void on_command(oc_gpio_t *gpio)
 {
-    clear_fd(gpio->command_fd);
+    oc_doorbell_clear(gpio->command_fd);
     if (!atomic_exchange(&gpio->has_frame, false)) return;
     if (gpio->lines[ROLE_TRIGGER]) {
-        if (gpio->config.trigger_mode == OC_TRIGGER_PER_FRAME) gpio->due_ns[DUE_TRIGGER_ON] = now_ns();
+        if (gpio->config.trigger_mode == OC_TRIGGER_PER_FRAME) gpio->due_ns[DUE_TRIGGER_ON] = oc_mono_ns();
     } else {
-        strobe_after(gpio, now_ns());
+        strobe_after(gpio, oc_mono_ns());
     }
 }
 
@@ -297,7 +280,7 @@ static void *thread_main(void *user)
     }
     while (!atomic_load(&gpio->is_stopped)) {
         const due_t due = next_due(gpio);
-        const int64_t now = now_ns();
+        const int64_t now = oc_mono_ns();
         if (gpio->due_ns[due] <= now) {
             carry_out(gpio, due, now);
             continue;
@@ -328,7 +311,7 @@ static bool open_lines(oc_gpio_t *gpio, char *error, size_t error_bytes)
 
 static void schedule(oc_gpio_t *gpio)
 {
-    const int64_t now = now_ns();
+    const int64_t now = oc_mono_ns();
     for (int i = 0; i < N_DUE; i++) gpio->due_ns[i] = NEVER;
     if (gpio->lines[ROLE_TRIGGER] && gpio->config.trigger_mode == OC_TRIGGER_PERIODIC)
         gpio->due_ns[DUE_TRIGGER_ON] = now;
@@ -338,8 +321,8 @@ static void schedule(oc_gpio_t *gpio)
 
 static bool gpio_open(oc_gpio_t *gpio, char *error, size_t error_bytes)
 {
-    gpio->command_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-    gpio->news_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    gpio->command_fd = oc_doorbell_open();
+    gpio->news_fd = oc_doorbell_open();
     if (gpio->command_fd < 0 || gpio->news_fd < 0) {
         snprintf(error, error_bytes, "eventfd: %s", strerror(errno));
         return false;
@@ -381,7 +364,7 @@ void oc_gpio_close(oc_gpio_t *gpio)
     if (!gpio) return;
     if (gpio->has_thread) {
         atomic_store(&gpio->is_stopped, true);
-        signal_fd(gpio->command_fd);
+        oc_doorbell_ring(gpio->command_fd);
         pthread_join(gpio->thread, NULL);
     }
     for (int i = 0; i < N_ROLES; i++) {
@@ -402,7 +385,7 @@ int oc_gpio_fd(const oc_gpio_t *gpio)
 
 void oc_gpio_clear(oc_gpio_t *gpio)
 {
-    clear_fd(gpio->news_fd);
+    oc_doorbell_clear(gpio->news_fd);
 }
 
 bool oc_gpio_is_enabled(const oc_gpio_t *gpio)
@@ -422,12 +405,12 @@ bool oc_gpio_take_mark(oc_gpio_t *gpio, int64_t *mono_ns)
 
 void oc_gpio_frame(oc_gpio_t *gpio)
 {
-    atomic_store(&gpio->last_frame_ns, now_ns());
+    atomic_store(&gpio->last_frame_ns, oc_mono_ns());
     const bool is_awaited = gpio->lines[ROLE_TRIGGER] ? gpio->config.trigger_mode == OC_TRIGGER_PER_FRAME
                                                       : gpio->lines[ROLE_STROBE] != NULL;
     if (!is_awaited) return;
     count_missed(gpio, atomic_exchange(&gpio->has_frame, true)); /* the thread has not come round to the one before */
-    signal_fd(gpio->command_fd);
+    oc_doorbell_ring(gpio->command_fd);
 }
 
 bool oc_gpio_pulse_of(const oc_gpio_t *gpio, int64_t mono_ns, int64_t *pulse_ns)

@@ -6,8 +6,9 @@
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/eventfd.h>
 #include <unistd.h>
+
+#include "doorbell.h"
 
 /* So many poses in a row that are too old, each newer than the one before: the publisher's clock was set back. */
 #define MAX_LATE 10u
@@ -38,7 +39,7 @@ oc_pose_track_t *oc_pose_track_create(uint32_t n, int64_t max_gap_us)
     track->capacity = n;
     track->max_gap_us = max_gap_us;
     track->ring = malloc(n * sizeof *track->ring);
-    track->added_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    track->added_fd = oc_doorbell_open();
     pthread_mutex_init(&track->lock, NULL);
     if (track->ring && track->added_fd >= 0) {
         memset(track->ring, 0xff, n * sizeof *track->ring); /* so that its pages are there from the start */
@@ -64,8 +65,7 @@ int oc_pose_track_fd(const oc_pose_track_t *track)
 
 void oc_pose_track_clear(oc_pose_track_t *track)
 {
-    uint64_t n;
-    if (read(track->added_fd, &n, sizeof n) < 0) return; /* nothing to clear */
+    oc_doorbell_clear(track->added_fd);
 }
 
 /* ---- adding ---- */
@@ -165,8 +165,7 @@ oc_status_t oc_pose_track_add(oc_pose_track_t *track, const oc_body_pose_t *pose
         *nth(track, track->n++) = *pose;
     }
     pthread_mutex_unlock(&track->lock);
-    const uint64_t one = 1;
-    if (is_newer && write(track->added_fd, &one, sizeof one) < 0) return OC_OK; /* readable already */
+    if (is_newer) oc_doorbell_ring(track->added_fd);
     return is_newer ? OC_OK : OC_E_STATE;
 }
 

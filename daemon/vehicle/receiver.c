@@ -9,8 +9,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/eventfd.h>
 #include <unistd.h>
+
+#include "doorbell.h"
 
 typedef struct waiting_packet {
     size_t n_bytes;
@@ -35,12 +36,6 @@ struct oc_receiver {
     waiting_packet_t packets[OC_RECEIVER_PACKETS];
 };
 
-static void signal_fd(int fd)
-{
-    const uint64_t one = 1;
-    if (write(fd, &one, sizeof one) < 0) return; /* full: readable already */
-}
-
 static void enqueue(oc_receiver_t *r, const uint8_t *packet, size_t n_bytes)
 {
     pthread_mutex_lock(&r->lock);
@@ -52,7 +47,7 @@ static void enqueue(oc_receiver_t *r, const uint8_t *packet, size_t n_bytes)
     }
     pthread_mutex_unlock(&r->lock);
     if (is_full) oc_counters_add(r->counters, OC_COUNT_PACKETS_FULL, 1);
-    signal_fd(r->ready_fd);
+    oc_doorbell_ring(r->ready_fd);
 }
 
 static void on_packet(void *user, const uint8_t *packet, size_t n_bytes)
@@ -98,15 +93,15 @@ static void *thread_main(void *user)
     oc_receiver_t *r = user;
     const char *fault = receive(r);
     atomic_store(&r->fault, fault);
-    if (fault) signal_fd(r->ready_fd);
+    if (fault) oc_doorbell_ring(r->ready_fd);
     return NULL;
 }
 
 static bool receiver_open(oc_receiver_t *r, const oc_receiver_config_t *config, oc_pose_track_t *track, char *error,
                           size_t error_bytes)
 {
-    r->stop_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-    r->ready_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    r->stop_fd = oc_doorbell_open();
+    r->ready_fd = oc_doorbell_open();
     if (r->stop_fd < 0 || r->ready_fd < 0) {
         snprintf(error, error_bytes, "eventfd: %s", strerror(errno));
         return false;
@@ -147,7 +142,7 @@ void oc_receiver_close(oc_receiver_t *r)
 {
     if (!r) return;
     if (r->has_thread) {
-        signal_fd(r->stop_fd);
+        oc_doorbell_ring(r->stop_fd);
         pthread_join(r->thread, NULL);
     }
     oc_pose_listener_close(r->poses);
@@ -170,7 +165,6 @@ int oc_receiver_fd(const oc_receiver_t *r)
 
 size_t oc_receiver_take(oc_receiver_t *r, uint8_t *buf)
 {
-    uint64_t ignored;
     pthread_mutex_lock(&r->lock);
     size_t n_bytes = 0;
     if (r->n > 0) {
@@ -181,7 +175,7 @@ size_t oc_receiver_take(oc_receiver_t *r, uint8_t *buf)
         r->n--;
     }
     /* Under the lock: a signal given before was for what has been taken by now. */
-    if (r->n == 0 && read(r->ready_fd, &ignored, sizeof ignored) < 0) ignored = 0;
+    if (r->n == 0) oc_doorbell_clear(r->ready_fd);
     pthread_mutex_unlock(&r->lock);
     return n_bytes;
 }

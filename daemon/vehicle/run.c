@@ -56,7 +56,7 @@ static void run_recall(vehicle_run_t *run, int64_t from_us, int64_t to_us)
 {
     uint32_t n = 0;
     if (oc_vehicle_recall(run->vehicle, from_us, to_us, &n) == OC_OK)
-        printf("outcropd: %" PRIu32 " views of the last %.1f s set free\n", n, (double)(to_us - from_us) * 1e-6);
+        printf("outcropd: %" PRIu32 " views set free of a stretch of %.1f s\n", n, (double)(to_us - from_us) * 1e-6);
     fflush(stdout);
 }
 

@@ -4,9 +4,9 @@
 
 #include <pthread.h>
 #include <stdlib.h>
-#include <sys/eventfd.h>
 #include <unistd.h>
 
+#include "doorbell.h"
 #include "pixel_codec.h"
 
 struct oc_tile_worker {
@@ -28,7 +28,6 @@ static void encode(oc_tile_job_t *job)
 static void *thread_main(void *user)
 {
     oc_tile_worker_t *w = user;
-    const uint64_t one = 1;
     pthread_mutex_lock(&w->lock);
     for (;;) {
         while (!w->is_stopped && w->n_done == w->n_posted) pthread_cond_wait(&w->posted, &w->lock);
@@ -38,7 +37,7 @@ static void *thread_main(void *user)
         encode(job);
         pthread_mutex_lock(&w->lock);
         w->n_done++;
-        if (write(w->done_fd, &one, sizeof one) < 0) continue; /* readable already */
+        oc_doorbell_ring(w->done_fd);
     }
     pthread_mutex_unlock(&w->lock);
     return NULL;
@@ -48,7 +47,7 @@ oc_tile_worker_t *oc_tile_worker_create(void)
 {
     oc_tile_worker_t *w = calloc(1, sizeof *w);
     if (!w) return NULL;
-    w->done_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    w->done_fd = oc_doorbell_open();
     if (w->done_fd < 0) {
         free(w);
         return NULL;
@@ -93,8 +92,7 @@ void oc_tile_worker_post(oc_tile_worker_t *w)
 
 const oc_tile_job_t *oc_tile_worker_oldest_done(oc_tile_worker_t *w)
 {
-    uint64_t n_signals;
-    if (read(w->done_fd, &n_signals, sizeof n_signals) < 0) n_signals = 0;
+    oc_doorbell_clear(w->done_fd);
     pthread_mutex_lock(&w->lock);
     const oc_tile_job_t *job = w->n_released < w->n_done ? &w->jobs[w->n_released % OC_TILE_JOBS] : NULL;
     pthread_mutex_unlock(&w->lock);

@@ -6,53 +6,19 @@
 #include <stdlib.h>
 
 #include "allocation_guard.h"
-#include "fake_gpio.h"
-#include "gpio.h"
+#include "gpio_rig.h"
 
-#define NS_PER_MS 1000000LL
-#define NS_PER_S 1000000000LL
-
-static oc_counters_t counters;
-static oc_gpio_config_t config;
-static oc_gpio_t *gpio;
-static char error[256];
 static fake_set_t sets[FAKE_MAX_SETS];
 
 void setUp(void)
 {
-    fake_reset();
-    memset(&counters, 0, sizeof counters);
-    config = (oc_gpio_config_t){.trigger_mode = OC_TRIGGER_PERIODIC,
-                                .trigger_rate_hz = 50,
-                                .trigger_pulse_us = 1000,
-                                .strobe_pulse_us = 1000,
-                                .heartbeat_ms = 50,
-                                .mark_debounce_ms = 50};
+    rig_set_up();
 }
 
 void tearDown(void)
 {
-    fake_release();
     guard_is_armed = false;
-    oc_gpio_close(gpio);
-    gpio = NULL;
-}
-
-static void open_all_right(void)
-{
-    gpio = oc_gpio_open(&config, &fake_ops, &counters, error, sizeof error);
-    TEST_ASSERT_NOT_NULL_MESSAGE(gpio, error);
-}
-
-static void close_now(void)
-{
-    oc_gpio_close(gpio);
-    gpio = NULL;
-}
-
-static uint32_t count_of(oc_counter_t counter)
-{
-    return oc_counters_get(&counters, counter);
+    rig_tear_down();
 }
 
 /* Rises and falls take turns, a rise first, and every pulse lasts at least as long as asked for. */
