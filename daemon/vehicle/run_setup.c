@@ -49,7 +49,8 @@ static void print_source(const vehicle_run_t *run, const oc_margin_t *margin)
 {
     const oc_capture_t *c = run->capture;
     if (run->config->source == OC_SOURCE_CAMERAS) {
-        printf("outcropd: %u cameras, frames of at most %ux%u\n", run->config->cameras.n_cameras, c->max_width_px,
+        const uint32_t n = run->config->cameras.n_cameras;
+        printf("outcropd: %u camera%s, frames of at most %ux%u\n", n, n == 1 ? "" : "s", c->max_width_px,
                c->max_height_px);
     } else if (c->n_frames == 0) {
         printf("outcropd: frames without end of at most %ux%u, margins %.4g m and %.4g deg\n", c->max_width_px,
