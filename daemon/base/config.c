@@ -19,7 +19,7 @@ typedef struct yaml_file {
     int *as, *method; /* places in as_words, method_words */
     double *area;
     uint32_t n_area;
-    yaml_bool_t *exit_when_settled;
+    yaml_bool_t *textures, *exit_when_settled;
 } yaml_file_t;
 
 #define OPTIONAL (CYAML_FLAG_OPTIONAL | CYAML_FLAG_POINTER)
@@ -28,7 +28,7 @@ typedef struct yaml_file {
     CYAML_FIELD_ENUM_PTR(key, OPTIONAL | CYAML_FLAG_STRICT, yaml_file_t, member, list, CYAML_ARRAY_LEN(list))
 
 static const cyaml_strval_t bool_words[] = {{"false", YAML_FALSE}, {"true", YAML_TRUE}};
-static const cyaml_strval_t as_words[] = {{"boxes", 0}, {"none", 1}};
+static const cyaml_strval_t as_words[] = {{"boxes", 0}, {"none", 1}, {"voxels", 2}};
 static const cyaml_strval_t method_words[] = {{"best", 0}, {"thesis", 1}};
 
 static const cyaml_schema_value_t number_schema = {CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT, double)};
@@ -42,6 +42,7 @@ static const cyaml_schema_field_t fields[] = {
     CYAML_FIELD_UINT_PTR("patch_quality", OPTIONAL, yaml_file_t, patch_quality),
     CYAML_FIELD_STRING_PTR("out", CYAML_FLAG_POINTER, yaml_file_t, out, 1, LONGEST),
     WORD_FIELD("as", as, as_words),
+    WORD_FIELD("textures", textures, bool_words),
     CYAML_FIELD_STRING_PTR("path", OPTIONAL, yaml_file_t, path, 1, LONGEST),
     WORD_FIELD("method", method, method_words),
     CYAML_FIELD_SEQUENCE_COUNT("area", OPTIONAL, yaml_file_t, area, n_area, &number_schema, 5, 5),
@@ -90,7 +91,13 @@ static const oc_yaml_key_t keys[] = {
      .example = "out",
      .meaning = "Folder of the run, from the working directory when it is not absolute; an older link.lcm in it is "
                 "overwritten."},
-    {.path = "as", .fallback = "boxes", .meaning = "How obstacles are shown; none: no sequence."},
+    {.path = "as",
+     .fallback = "boxes",
+     .meaning = "How obstacles are shown, and so what is asked for: voxels need silhouettes and textures; none: no "
+                "sequence."},
+    {.path = "textures",
+     .fallback = "true",
+     .meaning = "Ask for colour where the representation uses it; false: volumes of silhouettes alone."},
     {.path = "path",
      .form = "file",
      .without = "a loop round the obstacles",
@@ -140,6 +147,7 @@ static void take_file(const yaml_file_t *file, oc_base_config_t *config)
     COPY_TEXT(config->method, word_or(file->method, method_words, "method"));
     config->has_area = file->area != NULL;
     for (int i = 0; i < 5 && file->area; i++) config->area[i] = file->area[i];
+    config->with_textures = !file->textures || *file->textures == YAML_TRUE;
     config->exit_when_settled = file->exit_when_settled && *file->exit_when_settled == YAML_TRUE;
 }
 

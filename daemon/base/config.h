@@ -25,7 +25,8 @@ typedef struct oc_base_config {
     uint32_t datagram_bytes;
     uint32_t patch_quality;
     char out[OC_BASE_TEXT_BYTES];       /* folder that is written whenever the model settles */
-    char represent[OC_BASE_TEXT_BYTES]; /* "boxes" or "none" */
+    char represent[OC_BASE_TEXT_BYTES]; /* "boxes", "voxels" or "none" */
+    bool with_textures;
     char path[OC_BASE_TEXT_BYTES];      /* path file, "" = a loop round the obstacles */
     char method[16];                    /* "best" or "thesis" */
     bool has_area;

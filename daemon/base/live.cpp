@@ -80,13 +80,15 @@ Live::Live(const oc_base_config_t &config) : config_(config)
     output_.represent = config.represent;
     output_.path = config.path;
     output_.method = config.method;
+    output_.with_textures = config.with_textures;
     check_output(output_);
     if (config.lan_url[0]) republisher_ = std::make_unique<Republisher>(config.lan_url);
 
-    SessionOptions options = session_options(config.method);
+    SessionOptions options = session_options(output_);
     options.vehicle = config.vehicle;
     options.datagram_bytes = config.datagram_bytes;
     options.overhead.datagram_bytes = config.datagram_bytes;
+    options.shapes.datagram_bytes = config.datagram_bytes;
     options.patch_quality = static_cast<int>(config.patch_quality);
     if (config.has_area)
         options.area = Area{config.area[0], config.area[1], config.area[2], config.area[3], config.area[4]};

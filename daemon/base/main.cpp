@@ -125,8 +125,9 @@ int main(int argc, char **argv)
     CLI::App *replay_command = app.add_subcommand("replay", "the same on a captured LCM log");
     replay_command->add_option("LOG", options.log, "LCM log with the channels OCD and OCU")->required();
     replay_command->add_option("--out", options.output.dir, "folder to write")->required();
-    replay_command->add_option("--as", options.output.represent, "boxes or none")
-        ->check(CLI::IsMember({"boxes", "none"}));
+    replay_command->add_option("--as", options.output.represent, "boxes, voxels or none")
+        ->check(CLI::IsMember({"boxes", "voxels", "none"}));
+    replay_command->add_flag("!--no-textures", options.output.with_textures, "volumes of silhouettes alone");
     replay_command->add_option("--path", options.output.path, "path file; default: a loop round the obstacles");
     replay_command->add_option("--area", area, "working area X_MIN,X_MAX,Y_MIN,Y_MAX,Z_MAX in metres")
         ->delimiter(',')

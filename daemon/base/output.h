@@ -12,7 +12,8 @@ namespace outcrop {
 
 struct OutputOptions {
     std::string dir;
-    std::string represent = "boxes"; // "boxes" or "none"
+    std::string represent = "boxes"; // "boxes", "voxels" or "none"
+    bool with_textures = true;       // colour for voxels
     std::string path;                // path file; empty: a loop round the obstacles
     std::string method = "best";
 };
@@ -34,7 +35,7 @@ void check_output(const OutputOptions &options);
 void write_output(Session &session, const Ledger &ledger, const ReceiveCounts &received, const OutputOptions &options,
                   const Progress &progress);
 
-// Default options of a session for a method, "best" or "thesis".
-SessionOptions session_options(const std::string &method);
+// Options of a session for a method, "best" or "thesis", and a representation.
+SessionOptions session_options(const OutputOptions &options);
 
 } // namespace outcrop

@@ -13,7 +13,7 @@ namespace outcrop {
 void run_replay(const ReplayOptions &options, const Progress &progress)
 {
     check_output(options.output);
-    SessionOptions session_opts = session_options(options.output.method);
+    SessionOptions session_opts = session_options(options.output);
     session_opts.vehicle = options.vehicle;
     session_opts.area = options.area;
     Session session(session_opts, {});

@@ -46,7 +46,8 @@ void keep_blocks(const std::vector<std::uint16_t> &blocks, View *view)
 
 } // namespace
 
-Session::Session(const SessionOptions &options, Send send) : options_(options), send_(std::move(send))
+Session::Session(const SessionOptions &options, Send send)
+    : options_(options), send_(std::move(send)), shapes_(options.shapes)
 {
     AssembleOptions assemble;
     assemble.vehicle = options.vehicle;
@@ -79,7 +80,8 @@ FeedResult Session::receive(const std::uint8_t *packet, std::size_t n_bytes, dou
     }
     if (head.type == OC_PACKET_VIEW) note_view(packet, n_bytes);
     on_evidence(now_s);
-    if (head.type == OC_PACKET_OVERHEAD) return result;
+    if (head.type == OC_PACKET_OVERHEAD || head.type == OC_PACKET_SILHOUETTE || head.type == OC_PACKET_TEXTURE)
+        return result;
     is_model_current_ = false;
     if (head.type != OC_PACKET_PATCH) is_plan_current_ = false; // pixels say nothing about what else is wanted
     phase_ = Phase::kGather;
@@ -353,7 +355,24 @@ const SiteModel &Session::settle()
     model_ = build_site(list, area(), options_.build);
     if (rival_) rival_->make_tiles(plan_overhead(model_, options_.overhead));
     is_model_current_ = true;
+    if (options_.with_shapes && !rival_) shapes_.plan(model_, views());
     return model_;
+}
+
+std::vector<std::vector<CarveView>> Session::carve_views()
+{
+    if (!options_.with_shapes || rival_ || !is_model_current_) return {};
+    return shapes_.gather(model_, views(), assembler_);
+}
+
+Asker Session::asker(double now_s)
+{
+    Asker asker;
+    asker.may_ask = [this, now_s](Asked *asked) { return may_ask(asked, now_s); };
+    asker.is_given_up = [this](const Asked &asked) { return asked.tries > options_.max_tries; };
+    asker.next_head = [this] { return next_head(); };
+    asker.send = send_;
+    return asker;
 }
 
 void Session::step(double now_s)
@@ -373,7 +392,11 @@ void Session::step(double now_s)
         asked_tiles_.clear();
         phase_ = Phase::kOverhead;
     }
-    if (phase_ == Phase::kOverhead && !ask_tiles(now_s)) phase_ = Phase::kSettled;
+    if (phase_ == Phase::kOverhead && !ask_tiles(now_s))
+        phase_ = options_.with_shapes && !rival_ ? Phase::kSilhouettes : Phase::kSettled;
+    if (phase_ == Phase::kSilhouettes && !shapes_.ask_silhouettes(assembler_, asker(now_s))) phase_ = Phase::kTextures;
+    if (phase_ == Phase::kTextures && !shapes_.ask_textures(model_, views(), assembler_, asker(now_s)))
+        phase_ = Phase::kSettled;
 }
 
 } // namespace outcrop

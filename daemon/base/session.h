@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "null_rival.h"
+#include "shapes.h"
 #include "site/assemble.h"
 #include "site/model.h"
 #include "site/overhead.h"
@@ -25,6 +26,8 @@ struct SessionOptions {
     BuildOptions build;
     OverheadOptions overhead;
     WantedBlocksOptions wanted;
+    bool with_shapes = false; // silhouettes and textures as well as boxes
+    ShapeOptions shapes;
     int patch_quality = 8;             // 1..31
     double quiet_s = 0.25;             // without packets before more is asked for
     double longest_wait_s = 2.0;       // or after so long while packets keep coming
@@ -58,6 +61,9 @@ public:
     // views and of those pixels that the views together call for.
     const SiteModel &settle();
 
+    // What the views say about each obstacle of model(); empty without shapes.
+    std::vector<std::vector<CarveView>> carve_views();
+
     const std::map<int, View> &views();
     const SiteModel &model() const { return model_; }
     const std::map<TileKey, TileBlob> &tiles() const;
@@ -69,11 +75,7 @@ public:
     std::uint64_t keyframes_refused() const { return rival_ ? rival_->refused() : 0; }
 
 private:
-    enum class Phase { kGather, kOverhead, kSettled };
-    struct Asked {
-        double when_s = 0;
-        int tries = 0;
-    };
+    enum class Phase { kGather, kOverhead, kSilhouettes, kTextures, kSettled };
 
     void on_evidence(double now_s);
     FeedResult take_image(const std::uint8_t *packet, std::size_t n_bytes, double now_s);
@@ -90,6 +92,7 @@ private:
     void send_blocks(int view, const std::vector<std::uint16_t> &blocks);
     void send_tiles(const TileRequest &request);
     bool may_ask(Asked *asked, double now_s);
+    Asker asker(double now_s);
     bool is_source_done(double now_s) const;
     oc_packet_head_t next_head();
 
@@ -99,6 +102,7 @@ private:
     std::unique_ptr<NullRival> rival_;
     std::map<int, View> rival_views_;
     Phase phase_ = Phase::kGather;
+    ShapeDesk shapes_;
     SiteModel model_;
     std::optional<Area> known_area_;
     bool is_model_current_ = false;

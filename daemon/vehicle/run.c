@@ -81,8 +81,8 @@ static void run_take_packets(vehicle_run_t *run)
     while ((n_bytes = oc_receiver_take(run->receiver, run->packet)) > 0) {
         oc_packet_head_t head;
         if (oc_packet_decode_head(run->packet, n_bytes, &head) != OC_OK) continue; /* the receiver has looked */
-        if (head.type == OC_PACKET_OVERHEAD_REQUEST) {
-            oc_ground_tiles_request(&run->tiles, run->packet, n_bytes);
+        if (head.type == OC_PACKET_OVERHEAD_REQUEST || head.type == OC_PACKET_TEXTURE_REQUEST) {
+            oc_picture_tiles_request(&run->tiles, run->packet, n_bytes);
         } else if (head.type == OC_PACKET_RECALL_REQUEST) {
             run_take_recall(run, n_bytes);
         } else if (run->images) {
@@ -228,10 +228,10 @@ static bool run_send_next(vehicle_run_t *run)
     if (oc_vehicle_next(run->vehicle, run->packet, run->config->vehicle.datagram_bytes, &n_bytes) != OC_OK)
         return false;
     if (n_bytes > 0) return run_send(run, n_bytes);
-    oc_ground_tiles_feed(&run->tiles);
-    if (!oc_ground_tiles_has_next(&run->tiles)) return false;
+    oc_picture_tiles_feed(&run->tiles);
+    if (!oc_picture_tiles_has_next(&run->tiles)) return false;
     const oc_packet_head_t head = run_packet_head(run);
-    n_bytes = oc_ground_tiles_next(&run->tiles, &head, run->packet);
+    n_bytes = oc_picture_tiles_next(&run->tiles, &head, run->packet);
     return n_bytes > 0 && run_send(run, n_bytes);
 }
 

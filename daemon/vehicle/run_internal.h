@@ -3,7 +3,7 @@
 #ifndef OUTCROP_DAEMON_RUN_INTERNAL_H
 #define OUTCROP_DAEMON_RUN_INTERNAL_H
 
-#include "ground_tiles.h"
+#include "picture_tiles.h"
 #include "image_sender.h"
 #include "latency.h"
 #include "receiver.h"
@@ -20,7 +20,7 @@ typedef struct vehicle_run {
     oc_vehicle_t *vehicle;
     oc_rectify_t *rectify[OC_MAX_CAMERAS];
     oc_tile_worker_t *tile_worker;
-    oc_ground_tiles_t tiles;
+    oc_picture_tiles_t tiles;
     oc_image_sender_t *images; /* only in image mode */
     void *block;
     int signal_fd;

@@ -111,7 +111,7 @@ static bool run_open_vehicle(vehicle_run_t *run, char *error, size_t error_bytes
         is_ok = is_ok && run->images;
     }
     run->tile_worker = oc_tile_worker_create();
-    run->tiles = (oc_ground_tiles_t){.vehicle = run->vehicle,
+    run->tiles = (oc_picture_tiles_t){.vehicle = run->vehicle,
                                      .worker = run->tile_worker,
                                      .counters = &run->counters,
                                      .datagram_bytes = vehicle.datagram_bytes};

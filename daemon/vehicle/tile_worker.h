@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause
- * Ground tiles into WebP, in a thread of its own: the codec allocates and takes
+ * Ground and texture tiles into WebP, in a thread of its own: the codec allocates and takes
  * milliseconds, the thread of the frames must do neither. */
 #ifndef OUTCROP_DAEMON_TILE_WORKER_H
 #define OUTCROP_DAEMON_TILE_WORKER_H
@@ -17,9 +17,12 @@
 #define OC_TILE_MAX_PX 256u
 
 typedef struct oc_tile_job {
+    bool is_texture;
     uint16_t view;
-    double metres_per_pixel;
+    double metres_per_pixel; /* of an overhead tile */
     oc_tile_id_t tile;
+    uint8_t step_px; /* of a texture tile */
+    uint16_t texture_tile;
     uint16_t tile_px;
     uint8_t quality; /* to start from */
     uint8_t px[OC_TILE_MAX_PX * OC_TILE_MAX_PX * 3];

@@ -55,6 +55,8 @@ static bool type_is_known(uint32_t type)
     switch (type) {
     case OC_PACKET_VIEW:
     case OC_PACKET_PATCH:
+    case OC_PACKET_SILHOUETTE:
+    case OC_PACKET_TEXTURE:
     case OC_PACKET_OVERHEAD:
     case OC_PACKET_STATUS:
     case OC_PACKET_RELABEL:
@@ -63,6 +65,8 @@ static bool type_is_known(uint32_t type)
     case OC_PACKET_RESEND_REQUEST:
     case OC_PACKET_PATCH_REQUEST:
     case OC_PACKET_OVERHEAD_REQUEST:
+    case OC_PACKET_SILHOUETTE_REQUEST:
+    case OC_PACKET_TEXTURE_REQUEST:
     case OC_PACKET_RECALL_REQUEST: return true;
     default: return false;
     }

@@ -42,12 +42,22 @@ extern "C" {
 /* Tiles one overhead request may name. */
 #define OC_MAX_REQUEST_TILES 64u
 
+/* Boxes and views one silhouette request may hold. */
+#define OC_MAX_SILHOUETTE_BOXES 32u
+#define OC_MAX_SILHOUETTE_VIEWS 64u
+
+/* Cells of one silhouette. */
+#define OC_MAX_SILHOUETTE_CELLS 262144u
+
+/* Tiles one texture request may name. */
+#define OC_MAX_TEXTURE_TILES 256u
+
 typedef enum oc_packet_type {
     /* vehicle to base */
     OC_PACKET_VIEW = 1,
     OC_PACKET_PATCH = 2,
-    OC_PACKET_SILHOUETTE = 3, /* kept for the silhouette layer; refused in version 0 */
-    OC_PACKET_TEXTURE = 4,    /* kept for the texture layer; refused in version 0 */
+    OC_PACKET_SILHOUETTE = 3,
+    OC_PACKET_TEXTURE = 4,
     OC_PACKET_OVERHEAD = 5,
     OC_PACKET_STATUS = 6,
     OC_PACKET_RELABEL = 7,
@@ -57,9 +67,9 @@ typedef enum oc_packet_type {
     OC_PACKET_RESEND_REQUEST = 16,
     OC_PACKET_PATCH_REQUEST = 17,
     OC_PACKET_OVERHEAD_REQUEST = 18,
-    OC_PACKET_SILHOUETTE_REQUEST = 19, /* kept; refused in version 0 */
-    OC_PACKET_TEXTURE_REQUEST = 20,    /* kept; refused in version 0 */
-    OC_PACKET_RECALL_REQUEST = 21      /* send what was held back, or once more, of a stretch of time */
+    OC_PACKET_SILHOUETTE_REQUEST = 19,
+    OC_PACKET_TEXTURE_REQUEST = 20,
+    OC_PACKET_RECALL_REQUEST = 21 /* send what was held back, or once more, of a stretch of time */
 } oc_packet_type_t;
 
 typedef struct oc_packet_head {
@@ -156,6 +166,68 @@ typedef struct oc_overhead {
     uint16_t n_bytes;
     const uint8_t *bytes; /* encode: the caller's; decode: into the datagram */
 } oc_overhead_t;
+
+/* A box that stands on the ground, turned about the vertical. On the wire:
+ * 0.1 mm, yaw pi / 512. */
+typedef struct oc_ground_box {
+    double x_m, y_m;                   /* centre */
+    double length_m, width_m, height_m; /* length along yaw */
+    double yaw_rad;                    /* counter-clockwise from +X, [0, pi) */
+    bool is_subject;                   /* its silhouette is asked for; others only stand in the way */
+} oc_ground_box_t;
+
+/* The base's pose of a view as a step from the one that the vehicle reported:
+ * centre + move_m, exp(turn_rad) R. On the wire: 0.1 mm, 2e-5 rad. */
+typedef struct oc_pose_step {
+    uint16_t view;
+    double move_m[3], turn_rad[3];
+    bool is_wanted; /* the silhouettes of this view are to be sent; others only serve as references */
+} oc_pose_step_t;
+
+/* What stands out of the ground in these views, inside these boxes? */
+typedef struct oc_silhouette_request {
+    uint8_t step_px;      /* 1, 2 or 4: cells of the answer; doubled until it fits a datagram */
+    uint8_t grow_percent; /* how much larger than its box a subject may be, on each side; 0..100 */
+    bool is_thesis;       /* by the votes of thesis Table 6.1 */
+    uint8_t n_boxes, n_views;
+    oc_ground_box_t boxes[OC_MAX_SILHOUETTE_BOXES];
+    oc_pose_step_t views[OC_MAX_SILHOUETTE_VIEWS]; /* ids ascending */
+    uint16_t key; /* decode: of everything but is_wanted; the answers carry it. Encode: ignored */
+} oc_silhouette_request_t;
+
+/* One box in one view: a label for each cell of a rectangle. Cells outside the
+ * box's projection mean nothing. */
+typedef struct oc_silhouette {
+    uint16_t view;
+    uint16_t key;           /* of the request */
+    uint8_t box;            /* index in the request */
+    uint8_t step_px;        /* side of a cell: 1, 2, 4, 8 or 16 */
+    uint16_t col, row;      /* of the first cell, in cells from the image's corner */
+    uint16_t n_cols, n_rows; /* n_cols * n_rows <= OC_MAX_SILHOUETTE_CELLS */
+} oc_silhouette_t;
+
+/* Colour of a view in tiles: tile i of a picture of `across` tiles a row covers
+ * tile_px * step_px pixels a side from ((i % across), (i / across)) on. */
+typedef struct oc_texture_request {
+    uint16_t view;
+    bool is_cancelled;     /* what waits for this view is dropped; nothing else of the request counts */
+    uint8_t step_px;       /* 1, 2 or 4 pixels of the view to one of the texture */
+    uint8_t tile_px;       /* 16..128 */
+    uint8_t quality;       /* codec quality to start from, 1..100 */
+    bool is_masked;        /* blocks of 8x8 pixels that the last silhouettes call ground are flat */
+    uint32_t budget_bytes; /* of packets; tiles over it are not sent. 1..2^24 - 1: the base's estimate, with a margin */
+    uint16_t n_tiles;
+    uint16_t tiles[OC_MAX_TEXTURE_TILES]; /* ascending */
+} oc_texture_request_t;
+
+typedef struct oc_texture {
+    uint16_t view;
+    uint8_t step_px, tile_px;
+    uint16_t tile;
+    uint8_t codec; /* oc_codec_t */
+    uint16_t n_bytes;
+    const uint8_t *bytes; /* encode: the caller's; decode: into the datagram */
+} oc_texture_t;
 
 typedef struct oc_image_piece {
     oc_view_head_t head; /* part = index of the piece, is_last on the final one */
@@ -271,6 +343,11 @@ OC_CHECKED oc_status_t oc_packet_encode_overhead(const oc_packet_head_t *packet,
 /* As many of piece->n_bytes as fit; writes how many. is_last is set when they reach total_bytes. */
 OC_CHECKED oc_status_t oc_packet_encode_image(const oc_packet_head_t *packet, const oc_image_piece_t *piece,
                                               uint8_t *buf, size_t cap, size_t *n_bytes, uint16_t *bytes_taken);
+/* One packet, or OC_E_SPACE. labels: n_cols * n_rows of oc_label_t, by rows. */
+OC_CHECKED oc_status_t oc_packet_encode_silhouette(const oc_packet_head_t *packet, const oc_silhouette_t *silhouette,
+                                                   const uint8_t labels[], uint8_t *buf, size_t cap, size_t *n_bytes);
+OC_CHECKED oc_status_t oc_packet_encode_texture(const oc_packet_head_t *packet, const oc_texture_t *texture,
+                                                uint8_t *buf, size_t cap, size_t *n_bytes);
 OC_CHECKED oc_status_t oc_packet_encode_announce(const oc_packet_head_t *packet, const oc_announce_t *announce,
                                                  uint8_t *buf, size_t cap, size_t *n_bytes);
 OC_CHECKED oc_status_t oc_packet_encode_status(const oc_packet_head_t *packet, const oc_vehicle_status_t *status,
@@ -288,6 +365,14 @@ OC_CHECKED oc_status_t oc_packet_encode_overhead_request(const oc_packet_head_t 
                                                          const oc_overhead_request_t *request, uint8_t *buf, size_t cap,
                                                          size_t *n_bytes, uint16_t *tiles_taken);
 
+/* All of it or OC_E_SPACE; *key is that which the answers will carry. */
+OC_CHECKED oc_status_t oc_packet_encode_silhouette_request(const oc_packet_head_t *packet,
+                                                           const oc_silhouette_request_t *request, uint8_t *buf,
+                                                           size_t cap, size_t *n_bytes, uint16_t *key);
+/* As many tiles as fit. */
+OC_CHECKED oc_status_t oc_packet_encode_texture_request(const oc_packet_head_t *packet,
+                                                        const oc_texture_request_t *request, uint8_t *buf, size_t cap,
+                                                        size_t *n_bytes, uint16_t *tiles_taken);
 OC_CHECKED oc_status_t oc_packet_encode_recall(const oc_packet_head_t *packet, const oc_recall_request_t *request,
                                                uint8_t *buf, size_t cap, size_t *n_bytes);
 
@@ -300,6 +385,14 @@ OC_CHECKED oc_status_t oc_packet_decode_relabel(const uint8_t *buf, size_t n_byt
 OC_CHECKED oc_status_t oc_packet_decode_patch(const uint8_t *buf, size_t n_bytes, oc_patch_t *patch);
 OC_CHECKED oc_status_t oc_packet_decode_overhead(const uint8_t *buf, size_t n_bytes, oc_overhead_t *overhead);
 OC_CHECKED oc_status_t oc_packet_decode_image(const uint8_t *buf, size_t n_bytes, oc_image_piece_t *piece);
+/* labels: room for `cap` cells; OC_E_SPACE when there are more. Nothing is written on failure. */
+OC_CHECKED oc_status_t oc_packet_decode_silhouette(const uint8_t *buf, size_t n_bytes, oc_silhouette_t *silhouette,
+                                                   uint8_t labels[], size_t cap);
+OC_CHECKED oc_status_t oc_packet_decode_texture(const uint8_t *buf, size_t n_bytes, oc_texture_t *texture);
+OC_CHECKED oc_status_t oc_packet_decode_silhouette_request(const uint8_t *buf, size_t n_bytes,
+                                                           oc_silhouette_request_t *request);
+OC_CHECKED oc_status_t oc_packet_decode_texture_request(const uint8_t *buf, size_t n_bytes,
+                                                        oc_texture_request_t *request);
 OC_CHECKED oc_status_t oc_packet_decode_announce(const uint8_t *buf, size_t n_bytes, oc_announce_t *announce);
 OC_CHECKED oc_status_t oc_packet_decode_status(const uint8_t *buf, size_t n_bytes, oc_vehicle_status_t *status);
 OC_CHECKED oc_status_t oc_packet_decode_resend(const uint8_t *buf, size_t n_bytes, oc_resend_request_t *request);

@@ -28,6 +28,16 @@ bool TileKey::operator<(const TileKey &o) const
            std::tie(o.view, o.ix, o.iy, o.tile_px, o.metres_per_pixel);
 }
 
+bool SilhouetteKey::operator<(const SilhouetteKey &o) const
+{
+    return std::tie(view, request, box) < std::tie(o.view, o.request, o.box);
+}
+
+bool TextureKey::operator<(const TextureKey &o) const
+{
+    return std::tie(view, step_px, tile_px, tile) < std::tie(o.view, o.step_px, o.tile_px, o.tile);
+}
+
 bool PacketAssembler::Relabel::operator<(const Relabel &o) const
 {
     return std::tie(sequence, first, labels) < std::tie(o.sequence, o.first, o.labels);
@@ -54,6 +64,8 @@ FeedResult PacketAssembler::dispatch(const std::uint8_t *bytes, std::size_t n_by
     case OC_PACKET_RELABEL: return take_relabel(head, datagram);
     case OC_PACKET_PATCH: return take_patch(datagram);
     case OC_PACKET_OVERHEAD: return take_overhead(datagram);
+    case OC_PACKET_SILHOUETTE: return take_silhouette(datagram);
+    case OC_PACKET_TEXTURE: return take_texture(datagram);
     case OC_PACKET_STATUS: return take_status(head, datagram);
     case OC_PACKET_ANNOUNCE: return take_announce(datagram);
     default: return FeedResult::kOther;
@@ -144,11 +156,16 @@ FeedResult PacketAssembler::take_overhead(const Bytes &datagram)
     oc_overhead_t tile;
     if (oc_packet_decode_overhead(datagram.data(), datagram.size(), &tile) != OC_OK) return FeedResult::kIllFormed;
     const TileKey key{tile.view, tile.tile.ix, tile.tile.iy, tile.tile_px, tile.metres_per_pixel};
-    const TileBlob fresh{tile.codec, Bytes(tile.bytes, tile.bytes + tile.n_bytes)};
-    const auto known = tiles_.find(key);
-    if (known == tiles_.end()) {
-        if (tiles_.size() >= options_.max_tiles) return FeedResult::kFull;
-        tiles_[key] = fresh;
+    return take_tile(key, {tile.codec, Bytes(tile.bytes, tile.bytes + tile.n_bytes)}, &tiles_);
+}
+
+template <typename Key>
+FeedResult PacketAssembler::take_tile(const Key &key, TileBlob fresh, std::map<Key, TileBlob> *tiles) const
+{
+    const auto known = tiles->find(key);
+    if (known == tiles->end()) {
+        if (tiles->size() >= options_.max_tiles) return FeedResult::kFull;
+        (*tiles)[key] = std::move(fresh);
         return FeedResult::kTaken;
     }
     TileBlob &old = known->second;
@@ -156,7 +173,34 @@ FeedResult PacketAssembler::take_overhead(const Bytes &datagram)
     if (n_old > n_fresh) return FeedResult::kKnown;
     if (n_old == n_fresh && std::tie(old.bytes, old.codec) <= std::tie(fresh.bytes, fresh.codec))
         return FeedResult::kKnown;
-    old = fresh;
+    old = std::move(fresh);
+    return FeedResult::kTaken;
+}
+
+FeedResult PacketAssembler::take_texture(const Bytes &datagram)
+{
+    oc_texture_t tile;
+    if (oc_packet_decode_texture(datagram.data(), datagram.size(), &tile) != OC_OK) return FeedResult::kIllFormed;
+    const TextureKey key{tile.view, tile.step_px, tile.tile_px, tile.tile};
+    return take_tile(key, {tile.codec, Bytes(tile.bytes, tile.bytes + tile.n_bytes)}, &textures_);
+}
+
+FeedResult PacketAssembler::take_silhouette(const Bytes &datagram)
+{
+    oc_silhouette_t silhouette;
+    Bytes labels(OC_MAX_SILHOUETTE_CELLS);
+    if (oc_packet_decode_silhouette(datagram.data(), datagram.size(), &silhouette, labels.data(), labels.size()) !=
+        OC_OK)
+        return FeedResult::kIllFormed;
+    const SilhouetteKey key{silhouette.view, silhouette.key, silhouette.box};
+    const auto known = silhouettes_.find(key);
+    if (known == silhouettes_.end()) {
+        if (silhouettes_.size() >= options_.max_silhouettes) return FeedResult::kFull;
+        silhouettes_[key] = datagram;
+        return FeedResult::kTaken;
+    }
+    if (body_of(known->second) <= body_of(datagram)) return FeedResult::kKnown;
+    known->second = datagram;
     return FeedResult::kTaken;
 }
 

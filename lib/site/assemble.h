@@ -20,7 +20,8 @@ struct AssembleOptions {
     std::size_t max_views = 4096;      // views, complete or not, and views known from relabels and patches only
     std::size_t max_blocks = 1u << 20; // pixel blocks in all, 64 bytes each
     std::size_t max_relabels = 256;    // kept per view
-    std::size_t max_tiles = 1u << 16;  // overhead tiles in all, a datagram each
+    std::size_t max_tiles = 1u << 16;  // overhead tiles in all, a datagram each; texture tiles as many again
+    std::size_t max_silhouettes = 1u << 15; // a datagram each
 };
 
 enum class FeedResult {
@@ -45,13 +46,30 @@ struct TileBlob {
     std::vector<std::uint8_t> bytes;
 };
 
+// One silhouette as it came, a whole datagram; oc_packet_decode_silhouette makes labels of it.
+struct SilhouetteKey {
+    std::uint16_t view = 0, request = 0; // oc_silhouette_t::key
+    std::uint8_t box = 0;
+    bool operator<(const SilhouetteKey &o) const;
+};
+
+// One tile of a view's colour, coded.
+struct TextureKey {
+    std::uint16_t view = 0;
+    std::uint8_t step_px = 0, tile_px = 0;
+    std::uint16_t tile = 0;
+    bool operator<(const TextureKey &o) const;
+};
+
 // The state is a function of the set of packets taken, not of their order, as long as no bound is hit:
 // - parts of a view: the newest capture time wins over older ones of the same id (a vehicle that restarted); of two
 //   different packets for one part the one whose body is less as a byte string;
 // - pixel blocks: the higher quality; at equal quality the lesser bytes;
 // - labels of a junction: the relabel sent last, counted from the view's own part 0 modulo 65536; at equal sequence
 //   the greater labels as a byte string;
-// - tiles: per view, place and scale the one with more bytes (the codec adapts quality to fit), then the lesser bytes;
+// - tiles, of ground or texture: per view, place and scale the one with more bytes (the codec adapts quality to fit),
+//   then the lesser bytes;
+// - silhouettes: per view, request and box the one whose body is less as a byte string;
 // - status: greatest uptime, then sequence.
 // Not thread-safe.
 class PacketAssembler {
@@ -72,6 +90,8 @@ public:
     std::map<int, std::uint32_t> missing() const;
 
     const std::map<TileKey, TileBlob> &tiles() const { return tiles_; }
+    const std::map<SilhouetteKey, std::vector<std::uint8_t>> &silhouettes() const { return silhouettes_; }
+    const std::map<TextureKey, TileBlob> &textures() const { return textures_; }
     const std::optional<oc_vehicle_status_t> &status() const { return status_; }
     const std::map<int, std::int64_t> &announced() const { return announced_; } // view id -> utime_us
 
@@ -112,6 +132,9 @@ private:
     FeedResult take_relabel(const oc_packet_head_t &head, const Bytes &datagram);
     FeedResult take_patch(const Bytes &datagram);
     FeedResult take_overhead(const Bytes &datagram);
+    FeedResult take_silhouette(const Bytes &datagram);
+    FeedResult take_texture(const Bytes &datagram);
+    template <typename Key> FeedResult take_tile(const Key &key, TileBlob fresh, std::map<Key, TileBlob> *tiles) const;
     FeedResult take_status(const oc_packet_head_t &head, const Bytes &datagram);
     FeedResult take_announce(const Bytes &datagram);
     Entry *entry(int view);
@@ -123,6 +146,8 @@ private:
     std::map<int, Entry> entries_;
     std::map<int, View> views_;
     std::map<TileKey, TileBlob> tiles_;
+    std::map<SilhouetteKey, Bytes> silhouettes_;
+    std::map<TextureKey, TileBlob> textures_;
     std::map<int, std::int64_t> announced_;
     std::optional<oc_vehicle_status_t> status_;
     std::uint16_t status_sequence_ = 0;

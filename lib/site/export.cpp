@@ -80,6 +80,7 @@ json boxes_json(const std::vector<Obstacle> &obstacles)
                          {"size", vector_json(o.obb_size)},
                          {"yaw_deg", o.yaw_rad / kDegree}}},
                        {"points", o.n_points}});
+        if (o.voxel_m > 0) out.back()["voxel_size"] = o.voxel_m;
     }
     return out;
 }

@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "site/atomic_file.h"
+#include "site/render_voxels.h"
 #include "site/video.h"
 
 namespace outcrop {
@@ -37,10 +38,10 @@ void remove_old_frames(const fs::path &folder)
 } // namespace
 
 SequenceReport write_sequence(const std::string &dir, const std::string &as, const SiteModel &model,
-                              const OverheadMap &overhead, const Path &path, const SequenceOptions &options,
+                              const std::vector<Shape> &shapes, const OverheadMap &overhead, const Path &path, const SequenceOptions &options,
                               const std::function<void(int, int)> &progress)
 {
-    if (as != "boxes") throw std::invalid_argument("obstacles cannot be shown as " + as);
+    if (as != "boxes" && as != "voxels") throw std::invalid_argument("obstacles cannot be shown as " + as);
     if (path.frames.empty()) throw std::invalid_argument("the path has no frame");
     const fs::path folder = fs::path(dir) / as;
     fs::create_directories(folder);
@@ -49,13 +50,14 @@ SequenceReport write_sequence(const std::string &dir, const std::string &as, con
     fs::remove(video_path);
 
     const GroundTexture ground(overhead);
+    const VoxelCloud voxels(as == "voxels" ? shapes : std::vector<Shape>());
     const oc_intrinsics_t &first = path.frames.front().k;
     VideoWriter video(video_path.string(),
                       cv::Size(static_cast<int>(first.width_px), static_cast<int>(first.height_px)),
                       options.frames_per_s);
     const std::size_t n = path.frames.size();
     for (std::size_t i = 0; i < n; i++) {
-        const Frame frame = render_boxes(model, ground, path.frames[i], options.render);
+        const Frame frame = render_voxels(model, voxels, ground, path.frames[i], options.render);
         cv::Mat bgr;
         cv::cvtColor(frame.rgb, bgr, cv::COLOR_RGB2BGR);
         write_png((folder / numbered("frame", i, n)).string(), bgr);

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "site/overhead.h"
+#include "site/export_shape.h"
 #include "site/path.h"
 #include "site/render.h"
 #include "site/site_model.h"
@@ -25,10 +26,10 @@ struct SequenceReport {
 // Writes dir/<as>/frame_XX.png and mask_XX.png, one per frame of the path and
 // of its size (two digits, more when there are over a hundred), and
 // dir/<as>.mp4. Frames of an earlier run in that folder are removed first. as:
-// "boxes". progress(done, all) after each frame. Throws std::runtime_error or
+// "boxes" or "voxels" (of `shapes`; obstacles without one stay boxes). progress(done, all) after each frame. Throws std::runtime_error or
 // std::invalid_argument.
 SequenceReport write_sequence(const std::string &dir, const std::string &as, const SiteModel &model,
-                              const OverheadMap &overhead, const Path &path, const SequenceOptions &options,
+                              const std::vector<Shape> &shapes, const OverheadMap &overhead, const Path &path, const SequenceOptions &options,
                               const std::function<void(int, int)> &progress);
 
 } // namespace outcrop

@@ -59,6 +59,7 @@ struct Obstacle {
     double yaw_rad = 0;                                 // counter-clockwise from +X, (-pi/2, pi/2]
     int n_points = 0;
     bool is_suspected = false; // few points: shown, never dropped silently
+    double voxel_m = 0;        // side of the voxels it was carved in; 0: points only
 };
 
 struct SiteModel {

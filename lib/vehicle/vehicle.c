@@ -14,6 +14,7 @@ oc_vehicle_config_t oc_vehicle_defaults(void)
                                  .max_height_px = 480,
                                  .stored_views = 32,
                                  .keep_colour = true,
+                                 .with_silhouettes = true,
                                  .datagram_bytes = OC_MAX_DATAGRAM_BYTES,
                                  .max_sent_junctions = 300,
                                  .judoca = oc_judoca_defaults(),
@@ -37,7 +38,7 @@ static bool config_is_valid(const oc_vehicle_config_t *c)
 
 /* Bytes of the pieces of a block. */
 typedef struct layout {
-    size_t vehicle, views, grey, colour, junctions, votes, sent_indices, sent_labels, outgoing, judoca;
+    size_t vehicle, views, grey, colour, junctions, votes, sent_indices, sent_labels, solid, outgoing, judoca, silhouette;
 } layout_t;
 
 static layout_t layout_of(const oc_vehicle_config_t *c)
@@ -52,6 +53,8 @@ static layout_t layout_of(const oc_vehicle_config_t *c)
         .votes = c->judoca.max_junctions * sizeof(oc_ground_votes_t),
         .sent_indices = c->max_sent_junctions * sizeof(uint16_t),
         .sent_labels = c->judoca.max_junctions,
+        .solid = c->with_silhouettes ? ((size_t)c->max_width_px + 7u) / 8u * ((c->max_height_px + 7u) / 8u) : 0,
+        .silhouette = c->with_silhouettes ? oc_silhouette_size_bytes(c->max_width_px, c->max_height_px) : 0,
         .outgoing = c->max_sent_junctions * sizeof(oc_junction_t),
         .judoca = oc_judoca_size_bytes(c->max_width_px, c->max_height_px, &c->judoca),
     };
@@ -64,10 +67,11 @@ size_t oc_vehicle_size(const oc_vehicle_config_t *config)
     const layout_t l = layout_of(config);
     if (l.judoca == 0) return 0;
     const size_t per_view = oc_arena_cost(l.grey) + oc_arena_cost(l.colour) + oc_arena_cost(l.junctions) +
-                            oc_arena_cost(l.votes) + 2u * oc_arena_cost(l.sent_indices) + oc_arena_cost(l.sent_labels);
+                            oc_arena_cost(l.votes) + 2u * oc_arena_cost(l.sent_indices) + oc_arena_cost(l.sent_labels) +
+                            oc_arena_cost(l.solid);
     const size_t scratch =
         oc_arena_cost(l.grey) + oc_arena_cost(l.junctions) + oc_arena_cost(l.outgoing) + oc_arena_cost(l.judoca);
-    const size_t fixed = oc_arena_cost(l.vehicle) + oc_arena_cost(l.views) + scratch;
+    const size_t fixed = oc_arena_cost(l.vehicle) + oc_arena_cost(l.views) + scratch + l.silhouette;
     if (per_view > (SIZE_MAX - fixed) / config->stored_views) return 0;
     return fixed + config->stored_views * per_view;
 }
@@ -91,6 +95,7 @@ static void view_take(oc_arena_t *arena, const layout_t *l, stored_view_t *view)
     view->order = piece_of(arena, l->sent_indices);
     view->transmitted = piece_of(arena, l->sent_indices);
     view->sent_label = piece_of(arena, l->sent_labels);
+    view->solid = piece_of(arena, l->solid);
 }
 
 oc_status_t oc_vehicle_init(const oc_vehicle_config_t *config, void *block, size_t n_bytes, oc_vehicle_t **vehicle)
@@ -114,6 +119,12 @@ oc_status_t oc_vehicle_init(const oc_vehicle_config_t *config, void *block, size
     v->outgoing = piece_of(&arena, l.outgoing);
     v->judoca_block = piece_of(&arena, l.judoca);
     v->judoca_bytes = l.judoca;
+    if (config->with_silhouettes) {
+        const oc_status_t made =
+            oc_silhouette_init(&v->silhouette_ws, &arena, config->max_width_px, config->max_height_px);
+        OC_ASSERT(made == OC_OK);
+        (void)made;
+    }
     for (uint32_t i = 0; i < config->stored_views; i++) view_take(&arena, &l, &v->views[i]);
     *vehicle = v;
     return OC_OK;
@@ -311,6 +322,7 @@ static void view_add(oc_vehicle_t *vehicle, const oc_frame_t *frame, uint32_t n_
     stored_view_t *view = slot_claim(vehicle);
     view->head = head;
     pixels_store(vehicle, frame, view);
+    view->has_solid = false;
     view->n_junctions = n_junctions;
     memcpy(view->junctions, vehicle->junctions, n_junctions * sizeof *view->junctions);
     memset(view->votes, 0, n_junctions * sizeof *view->votes);

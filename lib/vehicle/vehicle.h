@@ -38,6 +38,7 @@ typedef struct oc_vehicle_config {
     uint32_t stored_views;       /* 2..256; each costs width * height * (channels stored) bytes */
     bool hold_views;             /* announce views and keep them until they are recalled; forced ones go at once */
     bool keep_colour;            /* store RGB as well as grey, for the overhead and texture layers */
+    bool with_silhouettes;       /* take part in the silhouette layer; costs about 15 bytes a pixel once */
     uint32_t datagram_bytes;     /* OC_MIN_DATAGRAM_BYTES..OC_MAX_DATAGRAM_BYTES */
     uint32_t max_sent_junctions; /* per view, 1..OC_MAX_JUNCTIONS */
     oc_judoca_params_t judoca;
@@ -88,15 +89,16 @@ OC_CHECKED oc_status_t oc_vehicle_push(oc_vehicle_t *vehicle, const oc_frame_t *
  * when from_us > to_us. */
 OC_CHECKED oc_status_t oc_vehicle_recall(oc_vehicle_t *vehicle, int64_t from_us, int64_t to_us, uint32_t *n);
 
-/* Take a packet of the base. Resend and patch requests are queued; to ask for
+/* Take a packet of the base. Resend, patch and silhouette requests are queued; to ask for
  * parts of a held view sets it free. OC_E_STATE when what they ask for has left
  * the ring, OC_E_SPACE when the queue is full, OC_E_FORMAT when ill-formed (all
- * counted). Not for overhead requests (decode them and use oc_vehicle_tile) nor
- * for recall requests, which may mean "until now" (decode, and oc_vehicle_recall). */
+ * counted). Not for overhead and texture requests (decode them and use
+ * oc_vehicle_tile, oc_vehicle_texture) nor for recall requests, which may mean "until now" (decode, and oc_vehicle_recall). */
 OC_CHECKED oc_status_t oc_vehicle_handle(oc_vehicle_t *vehicle, const uint8_t *packet, size_t n_bytes);
 
 /* The next datagram to send, or n_bytes = 0 when there is none. Order: view
- * parts (newest view first), relabels, resends, patches. */
+ * parts (newest view first), relabels, resends, patches, silhouettes. One of
+ * the last takes 5 to 30 ms, one box in one view; all others well under one. */
 OC_CHECKED oc_status_t oc_vehicle_next(oc_vehicle_t *vehicle, uint8_t *buf, size_t cap, size_t *n_bytes);
 
 /* Warp one ground tile of a stored view (RGB or grey, as stored) into out
@@ -104,6 +106,13 @@ OC_CHECKED oc_status_t oc_vehicle_next(oc_vehicle_t *vehicle, uint8_t *buf, size
  * mid-grey; n_seen says how many were inside. OC_E_STATE when the view has left the ring. */
 OC_CHECKED oc_status_t oc_vehicle_tile(const oc_vehicle_t *vehicle, const oc_overhead_request_t *request,
                                        oc_tile_id_t tile, oc_image_mut_t *out, uint32_t *n_seen);
+
+/* One tile of a stored view's colours (RGB or grey, as stored) into out (tile_px x tile_px), each pixel the mean of
+ * step_px x step_px. With is_masked, blocks of 8x8 pixels of the view that its last silhouettes call ground, or that
+ * no box reaches, become flat; all of it shows when there are none. n_solid: pixels of the view that show. OC_E_STATE
+ * when the view has left the ring, OC_E_ARG when the tile lies outside it. */
+OC_CHECKED oc_status_t oc_vehicle_texture(const oc_vehicle_t *vehicle, const oc_texture_request_t *request,
+                                          uint16_t tile, oc_image_mut_t *out, uint32_t *n_solid);
 
 /* The stored rectified image of a view (borrowed until the next push), or OC_E_STATE. */
 OC_CHECKED oc_status_t oc_vehicle_stored(const oc_vehicle_t *vehicle, uint16_t view, oc_image_t *image);

@@ -6,6 +6,7 @@
 #include <assert.h>
 
 #include "vehicle/arena.h"
+#include "vehicle/silhouette.h"
 #include "vehicle/vehicle.h"
 
 #define OC_MAX_STORED_VIEWS 256u
@@ -15,6 +16,9 @@
 
 /* Patch requests that wait; 1 kB each. */
 #define OC_MAX_WAITING_PATCHES 64u
+
+/* Silhouette requests that wait; 7 kB each. */
+#define OC_MAX_WAITING_SILHOUETTES 4u
 
 /* A run of junctions and ties that travels as one packet. */
 typedef struct view_run {
@@ -42,6 +46,10 @@ typedef struct stored_view {
     uint16_t n_ties;
     view_run_t runs[OC_MAX_VIEW_PARTS];
     uint8_t n_parts;
+
+    uint8_t *solid; /* [blocks of 8x8 px] 1: the last silhouettes do not call it ground */
+    bool has_solid;
+    uint16_t solid_key;
 
     bool is_held;                      /* its parts wait for a recall; it is announced meanwhile */
     bool is_announced;                 /* nothing to send, or nothing yet, but that it exists */
@@ -78,6 +86,10 @@ struct oc_vehicle {
 
     oc_patch_request_t patches[OC_MAX_WAITING_PATCHES]; /* oldest first; blocks still to be sent */
     uint32_t n_patches;
+
+    oc_silhouette_ws_t silhouette_ws;
+    oc_silhouette_request_t silhouettes[OC_MAX_WAITING_SILHOUETTES]; /* oldest first; views still wanted */
+    uint32_t n_silhouettes, next_box;                                /* of the first wanted view of silhouettes[0] */
 };
 
 /* ---- shared by vehicle*.c ---- */
@@ -104,6 +116,12 @@ void oc_vehicle_forget(oc_vehicle_t *vehicle, stored_view_t *view);
 
 /* The junctions [from, to) of the transmit order have new labels. */
 void oc_vehicle_relabelled(stored_view_t *view, uint32_t from, uint32_t to);
+
+/* Queue a silhouette request; OC_E_SPACE when there is no room, OC_E_STATE when none of its views is stored. */
+OC_CHECKED oc_status_t oc_vehicle_ask_silhouettes(oc_vehicle_t *vehicle, const oc_silhouette_request_t *request);
+
+/* The next silhouette as a packet; OC_OK with *n_bytes = 0 when none is asked for. */
+OC_CHECKED oc_status_t oc_vehicle_next_silhouette(oc_vehicle_t *vehicle, uint8_t *buf, size_t *n_bytes);
 
 /* Compare the new view with the best stored ones: labels of both, ties, relabels. */
 void oc_vehicle_filter(oc_vehicle_t *vehicle, stored_view_t *fresh);

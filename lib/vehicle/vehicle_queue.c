@@ -232,6 +232,7 @@ oc_status_t oc_vehicle_handle(oc_vehicle_t *vehicle, const uint8_t *packet, size
     oc_packet_head_t head;
     oc_resend_request_t resend;
     oc_patch_request_t patch;
+    oc_silhouette_request_t silhouettes;
     oc_status_t status = packet ? oc_packet_decode_head(packet, n_bytes, &head) : OC_E_FORMAT;
     if (status == OC_OK && head.vehicle != vehicle->config.vehicle) return OC_OK; /* for another one on the link */
     if (status == OC_OK && head.type == OC_PACKET_RESEND_REQUEST) {
@@ -240,6 +241,9 @@ oc_status_t oc_vehicle_handle(oc_vehicle_t *vehicle, const uint8_t *packet, size
     } else if (status == OC_OK && head.type == OC_PACKET_PATCH_REQUEST) {
         status = oc_packet_decode_patch_request(packet, n_bytes, &patch);
         if (status == OC_OK) return handle_patch(vehicle, &patch);
+    } else if (status == OC_OK && head.type == OC_PACKET_SILHOUETTE_REQUEST && vehicle->config.with_silhouettes) {
+        status = oc_packet_decode_silhouette_request(packet, n_bytes, &silhouettes);
+        if (status == OC_OK) return oc_vehicle_ask_silhouettes(vehicle, &silhouettes);
     }
     oc_vehicle_add(vehicle, OC_COUNT_REQUESTS_BAD, 1);
     return OC_E_FORMAT;
@@ -369,6 +373,7 @@ oc_status_t oc_vehicle_next(oc_vehicle_t *vehicle, uint8_t *buf, size_t cap, siz
         if (status == OC_OK && n == 0) status = next_relabel(vehicle, buf, &n);
         if (status == OC_OK && n == 0) status = next_view(vehicle, true, buf, &n);
         if (status == OC_OK && n == 0) status = next_patch(vehicle, buf, &n);
+        if (status == OC_OK && n == 0) status = oc_vehicle_next_silhouette(vehicle, buf, &n);
         if (status == OC_OK) {
             if (n > 0) vehicle->sequence++;
             *n_bytes = n;

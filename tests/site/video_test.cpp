@@ -132,7 +132,7 @@ protected:
         map.seen = cv::Mat1b(100, 100, static_cast<unsigned char>(255));
         map.x_min = -1;
         map.y_max = 1;
-        return write_sequence(dir_, as, {}, map, path, {}, [&](int done, int all) {
+        return write_sequence(dir_, as, {}, {}, map, path, {}, [&](int done, int all) {
             EXPECT_EQ(all, n_frames);
             EXPECT_EQ(done, ++n_done_);
         });

@@ -12,6 +12,7 @@ struct DriveOptions {
     ReportedSiteOptions site;
     std::string out;
     std::string represent = "boxes";
+    bool with_textures = true;
     std::string path; // empty: the site's own, else a loop
     std::string method = "best";
     std::string link = "layers"; // "layers" or "images:jpeg:Q" or "images:webp:Q"

@@ -16,7 +16,9 @@ void add_options(CLI::App *app, outcrop::DriveOptions *options, std::string *per
 {
     app->add_option("SITE", options->site.site, "site folder, or its cameras file")->required();
     app->add_option("--out", options->out, "folder to write")->required();
-    app->add_option("--as", options->represent, "how obstacles are shown")->check(CLI::IsMember({"boxes", "none"}));
+    app->add_option("--as", options->represent, "how obstacles are shown: boxes, voxels or none")
+        ->check(CLI::IsMember({"boxes", "voxels", "none"}));
+    app->add_flag("!--no-textures", options->with_textures, "voxels of silhouettes alone, no colour is asked for");
     app->add_option("--path", options->path, "path file; default: the site's path.json, else a loop")
         ->check(CLI::ExistingFile);
     app->add_option("--views", options->site.views, "indices of the views to use")->delimiter(',');
