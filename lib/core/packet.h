@@ -187,7 +187,7 @@ typedef struct oc_pose_step {
 /* What stands out of the ground in these views, inside these boxes? */
 typedef struct oc_silhouette_request {
     uint8_t step_px;      /* 1, 2 or 4: cells of the answer; doubled until it fits a datagram */
-    uint8_t grow_percent; /* how much larger than its box a subject may be, on each side; 0..100 */
+    uint8_t grow_percent; /* how much larger than its box a subject may be on each side, of its largest one; 0..100 */
     bool is_thesis;       /* by the votes of thesis Table 6.1 */
     uint8_t n_boxes, n_views;
     oc_ground_box_t boxes[OC_MAX_SILHOUETTE_BOXES];

@@ -223,6 +223,11 @@ Obstacle fit_box(const std::vector<SitePoint> &points, const std::vector<int> &g
     return box;
 }
 
+double largest_side(const Obstacle &box)
+{
+    return std::max({box.obb_size.x(), box.obb_size.y(), box.aabb_max.z()});
+}
+
 bool footprint_contains(const Obstacle &box, double x, double y, double grow_m)
 {
     const Vector2d along = direction(box.yaw_rad), across(-along.y(), along.x());

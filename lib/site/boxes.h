@@ -51,6 +51,8 @@ Obstacle fit_box(const std::vector<SitePoint> &points, const std::vector<int> &m
 void make_boxes(const Clusters &clusters, double diagonal_m, const BoxOptions &options, std::vector<SitePoint> *points,
                 std::vector<Obstacle> *obstacles, std::vector<Obstacle> *suspected);
 
+double largest_side(const Obstacle &box); // height included
+
 // Is a ground point inside the oriented footprint grown by `grow_m`?
 bool footprint_contains(const Obstacle &box, double x, double y, double grow_m = 0);
 

@@ -23,12 +23,13 @@ using Eigen::Vector3d;
 void bounds_of(const Obstacle &box, double grow, Vector3d *low, Vector3d *high)
 {
     const double c = std::abs(std::cos(box.yaw_rad)), s = std::abs(std::sin(box.yaw_rad));
-    const double a = (0.5 + grow) * box.obb_size.x(), b = (0.5 + grow) * box.obb_size.y();
+    const double more = grow * largest_side(box);
+    const double a = box.obb_size.x() / 2 + more, b = box.obb_size.y() / 2 + more;
     const Vector3d half(c * a + s * b, s * a + c * b, 0);
     *low = box.obb_centre - half;
     *high = box.obb_centre + half;
     low->z() = 0;
-    high->z() = (1 + grow) * box.aabb_max.z();
+    high->z() = box.aabb_max.z() + more;
 }
 
 // Metres that a pixel covers at the box, of the view that sees it finest.
@@ -119,7 +120,7 @@ bool says_anything(const CarveView &view)
 // Ground is never inside the grown box's own turned footprint alone: what lies outside that is not looked at.
 void cut_to_box(const Obstacle &box, double grow, VoxelGrid *grid)
 {
-    const double slack = grow * std::max(box.obb_size.x(), box.obb_size.y());
+    const double slack = grow * largest_side(box);
     for (int j = 0; j < grid->ny; j++) {
         for (int i = 0; i < grid->nx; i++) {
             const Vector3d at = grid->centre(i, j, 0);
@@ -235,41 +236,34 @@ struct Side {
     double low = 0, high = 0;
 };
 
-// Where the middle `share` of the volume's occupied voxels lies along an axis; the ground end keeps everything.
-Side middle_of(std::vector<double> weights, double first, double step, double share, bool keeps_low)
+// Where the volume lies along an axis, but for the outermost `trim` of it at each end.
+Side volume_along(const VoxelGrid &grid, const Vector3d &axis, double trim)
 {
-    double total = 0;
-    for (const double w : weights) total += w;
-    const double cut = (1 - share) * total / (keeps_low ? 1 : 2);
-    std::size_t low = 0, high = weights.size() - 1;
-    double sum = 0;
-    if (!keeps_low)
-        while (low < high && sum + weights[low] <= cut) sum += weights[low++];
-    sum = 0;
-    while (high > low && sum + weights[high] <= cut) sum += weights[high--];
-    return {first + step * static_cast<double>(low), first + step * static_cast<double>(high + 1)};
-}
-
-Side volume_along(const VoxelGrid &grid, const Vector3d &axis, double share, bool keeps_low)
-{
-    double low = 1e300, high = -1e300;
     std::vector<double> at;
     for (int k = 0; k < grid.nz; k++)
         for (int j = 0; j < grid.ny; j++)
             for (int i = 0; i < grid.nx; i++)
-                if (grid.is_occupied(i, j, k)) at.push_back(axis.dot(grid.centre(i, j, k)));
-    for (const double a : at) low = std::min(low, a), high = std::max(high, a);
-    low -= grid.size_m / 2, high += grid.size_m / 2;
-    const auto n = static_cast<std::size_t>(std::ceil((high - low) / grid.size_m));
-    std::vector<double> weights(std::max<std::size_t>(n, 1), 0.0);
-    for (const double a : at)
-        weights[std::min(weights.size() - 1, static_cast<std::size_t>((a - low) / grid.size_m))] += 1;
-    return middle_of(weights, low, grid.size_m, share, keeps_low);
+                if (grid.is_surface(i, j, k)) at.push_back(axis.dot(grid.centre(i, j, k)));
+    std::sort(at.begin(), at.end());
+    const auto cut = static_cast<std::size_t>(trim * static_cast<double>(at.size()));
+    return {at[cut] - grid.size_m / 2, at[at.size() - 1 - cut] + grid.size_m / 2};
 }
 
-double between(double from, double to, double trust)
+// One side of the box, outward positive. The volume is the outer bound of the body: where it ends before the points'
+// side, that side was widened too far. Where it goes on beyond, it is too large by what views from few sides leave, or
+// the points missed an end: only what is more than usual counts.
+double side_between(double points, double volume, double size, double dead_share, const FinalBoxOptions &options)
 {
-    return from + trust * (to - from);
+    const double beyond = volume - points;
+    if (beyond < 0) return points + options.inward_trust * beyond;
+    return points + std::max(0.0, beyond - dead_share * size);
+}
+
+Side sides_between(const Side &points, const Side &volume, double dead_share, const FinalBoxOptions &options)
+{
+    const double size = points.high - points.low;
+    return {-side_between(-points.low, -volume.low, size, dead_share, options),
+            side_between(points.high, volume.high, size, dead_share, options)};
 }
 
 } // namespace
@@ -278,25 +272,24 @@ Obstacle final_box(const Obstacle &points_box, const Carved &carved, const Final
 {
     Obstacle box = points_box;
     if (carved.is_empty() || count_occupied(carved.grid) == 0) return box;
-    const Vector3d axes[3] = {Vector3d::UnitX(), Vector3d::UnitY(), Vector3d::UnitZ()};
-    for (int a = 0; a < 3; a++) {
-        const Side side = volume_along(carved.grid, axes[a], options.volume_share, a == 2);
-        const double trust = a == 2 ? options.top_trust : options.side_trust;
-        if (a < 2) box.aabb_min[a] = between(points_box.aabb_min[a], side.low, trust);
-        box.aabb_max[a] = between(points_box.aabb_max[a], side.high, trust);
-    }
+    const auto along_axis = [&](const Vector3d &axis, double low, double high, double dead_share) {
+        return sides_between({low, high}, volume_along(carved.grid, axis, options.trim_share), dead_share, options);
+    };
+    const Side x = along_axis(Vector3d::UnitX(), box.aabb_min.x(), box.aabb_max.x(), options.side_dead_share);
+    const Side y = along_axis(Vector3d::UnitY(), box.aabb_min.y(), box.aabb_max.y(), options.side_dead_share);
+    const Side z = along_axis(Vector3d::UnitZ(), 0, box.aabb_max.z(), options.top_dead_share);
+    box.aabb_min = Vector3d(x.low, y.low, box.aabb_min.z());
+    box.aabb_max = Vector3d(x.high, y.high, z.high);
     const Vector3d along(std::cos(box.yaw_rad), std::sin(box.yaw_rad), 0), across(-along.y(), along.x(), 0);
-    const Side u = volume_along(carved.grid, along, options.volume_share, false);
-    const Side v = volume_along(carved.grid, across, options.volume_share, false);
-    const double cu = along.dot(points_box.obb_centre), cv = across.dot(points_box.obb_centre);
-    const double u_low = between(cu - points_box.obb_size.x() / 2, u.low, options.side_trust);
-    const double u_high = between(cu + points_box.obb_size.x() / 2, u.high, options.side_trust);
-    const double v_low = between(cv - points_box.obb_size.y() / 2, v.low, options.side_trust);
-    const double v_high = between(cv + points_box.obb_size.y() / 2, v.high, options.side_trust);
+    const auto turned = [&](const Vector3d &axis, double size) {
+        const double middle = axis.dot(points_box.obb_centre);
+        return along_axis(axis, middle - size / 2, middle + size / 2, options.side_dead_share);
+    };
+    const Side u = turned(along, points_box.obb_size.x()), v = turned(across, points_box.obb_size.y());
     const double top = box.aabb_max.z(), floor = box.aabb_min.z();
-    const Vector3d centre = (u_low + u_high) / 2 * along + (v_low + v_high) / 2 * across;
+    const Vector3d centre = (u.low + u.high) / 2 * along + (v.low + v.high) / 2 * across;
     box.obb_centre = Vector3d(centre.x(), centre.y(), (floor + top) / 2);
-    box.obb_size = Vector3d(u_high - u_low, v_high - v_low, top - floor);
+    box.obb_size = Vector3d(u.high - u.low, v.high - v.low, top - floor);
     return box;
 }
 

@@ -61,12 +61,13 @@ struct Carved {
 Carved carve(const Obstacle &box, const std::vector<CarveView> &views, const CarveOptions &options = {});
 
 // Box of the points and of the volume together. Points lie on the body but may miss its ends; the volume holds the body
-// but is too large where views are few. Each side goes where the volume ends (95 % of it), but no farther beyond the
-// points' side than `beyond` of the way, and no farther inside than the outermost points that agree.
+// but is too large where views are few, most at its top. A side that the points' box has beyond the volume's is drawn
+// in; one that the volume has far beyond the points' is drawn out, by what is more than a volume usually is too large.
 struct FinalBoxOptions {
-    double volume_share = 0.95;
-    double side_trust = 0.8; // of the way from the points' side to the volume's
-    double top_trust = 0.5;
+    double trim_share = 0.001;     // of the volume's surface that may lie outside at each end
+    double inward_trust = 0.8;     // of the way to the volume's side
+    double side_dead_share = 0.06; // of the box's side: beyond the points' side by less means nothing
+    double top_dead_share = 0.2;
 };
 Obstacle final_box(const Obstacle &points_box, const Carved &carved, const FinalBoxOptions &options = {});
 

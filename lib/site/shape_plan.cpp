@@ -69,14 +69,14 @@ bool can_travel(const oc_pose_step_t &step)
 
 std::array<Vector3d, 8> corners(const Obstacle &box, double grow)
 {
-    const double c = std::cos(box.yaw_rad), s = std::sin(box.yaw_rad);
+    const double c = std::cos(box.yaw_rad), s = std::sin(box.yaw_rad), more = grow * largest_side(box);
     std::array<Vector3d, 8> out;
     for (int i = 0; i < 8; i++) {
-        const double along = ((i & 1) ? 0.5 + grow : -0.5 - grow) * box.obb_size.x();
-        const double across = ((i & 2) ? 0.5 + grow : -0.5 - grow) * box.obb_size.y();
+        const double along = ((i & 1) ? 1 : -1) * (box.obb_size.x() / 2 + more);
+        const double across = ((i & 2) ? 1 : -1) * (box.obb_size.y() / 2 + more);
         out[static_cast<std::size_t>(i)] =
             Vector3d(box.obb_centre.x() + c * along - s * across, box.obb_centre.y() + s * along + c * across,
-                     (i & 4) ? (1 + grow) * box.aabb_max.z() : 0);
+                     (i & 4) ? box.aabb_max.z() + more : 0);
     }
     return out;
 }

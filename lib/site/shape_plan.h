@@ -19,7 +19,7 @@ namespace outcrop {
 
 struct ShapeOptions {
     int step_px = 2;           // cells of silhouettes: 1, 2 or 4 px
-    double grow_share = 0.15;  // by which a body may be larger than its points' box, each side
+    double grow_share = 0.15;  // by which a body may be larger than its points' box on each side, of its largest one
     bool is_thesis = false;    // silhouettes by the votes of Table 6.1
     std::size_t datagram_bytes = 1380;
     bool with_textures = true;

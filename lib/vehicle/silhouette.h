@@ -47,7 +47,7 @@ typedef struct oc_sight {
 typedef struct oc_silhouette_task {
     const oc_ground_box_t *boxes; /* [n_boxes] everything that may stand in the way, the subject too */
     uint32_t n_boxes, subject;    /* n_boxes <= OC_MAX_SILHOUETTE_BOXES */
-    double grow;                  /* share of its sides by which the subject may be larger, each side; 0..1 */
+    double grow;                  /* by which the subject may be larger on each side, of its largest one; 0..1 */
     oc_silhouette_method_t method;
 } oc_silhouette_task_t;
 

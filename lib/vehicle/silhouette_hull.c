@@ -46,8 +46,9 @@ static void hull_make(const double px[OC_BOX_CORNERS], const double py[OC_BOX_CO
 bool oc_hull_of_box(const oc_ground_box_t *box, double grow, const oc_camera_t *camera, oc_hull_t *hull)
 {
     const double c = cos(box->yaw_rad), s = sin(box->yaw_rad);
-    const double half_length = (0.5 + grow) * box->length_m, half_width = (0.5 + grow) * box->width_m;
-    const double height = (1.0 + grow) * box->height_m;
+    const double more = grow * fmax(fmax(box->length_m, box->width_m), box->height_m);
+    const double half_length = 0.5 * box->length_m + more, half_width = 0.5 * box->width_m + more;
+    const double height = box->height_m + more;
     const double near_m = NEAR_SHARE * sqrt(half_length * half_length + half_width * half_width + height * height);
     double x[OC_BOX_CORNERS], y[OC_BOX_CORNERS];
     for (uint32_t i = 0; i < OC_BOX_CORNERS; i++) {

@@ -19,7 +19,7 @@ typedef struct oc_hull {
     double x[OC_BOX_CORNERS], y[OC_BOX_CORNERS];
 } oc_hull_t;
 
-/* Projection of a box grown by a share of its sides. False when a corner is nearer than a hundredth of the box's
+/* Projection of a box grown by a share of its largest side, on every side but the ground's. False when a corner is nearer than a hundredth of the box's
  * size, or behind. */
 bool oc_hull_of_box(const oc_ground_box_t *box, double grow, const oc_camera_t *camera, oc_hull_t *hull);
 bool oc_hull_contains(const oc_hull_t *hull, double x_px, double y_px);
