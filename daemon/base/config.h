@@ -27,8 +27,8 @@ typedef struct oc_base_config {
     char out[OC_BASE_TEXT_BYTES];       /* folder that is written whenever the model settles */
     char represent[OC_BASE_TEXT_BYTES]; /* "boxes", "voxels" or "none" */
     bool with_textures;
-    char path[OC_BASE_TEXT_BYTES];      /* path file, "" = a loop round the obstacles */
-    char method[16];                    /* "best" or "thesis" */
+    char path[OC_BASE_TEXT_BYTES]; /* path file, "" = a loop round the obstacles */
+    char method[16];               /* "best" or "thesis" */
     bool has_area;
     double area[5]; /* x_min, x_max, y_min, y_max, z_max; metres */
     bool exit_when_settled;

@@ -187,11 +187,12 @@ void write_output(Session &session, const Ledger &ledger, const ReceiveCounts &r
     if (options.represent != "none") {
         Stopwatch watch;
         const Path path = options.path.empty() ? loop_path(model) : read_path(options.path);
-        const SequenceReport done = write_sequence(
-            options.dir + "/sequence", options.represent, finished, shapes, overhead, path, {}, [&](int frame, int frames) {
-                if (frame % 10 == 0 || frame == frames)
-                    progress("frame " + std::to_string(frame) + " of " + std::to_string(frames));
-            });
+        const SequenceReport done =
+            write_sequence(options.dir + "/sequence", options.represent, finished, shapes, overhead, path, {},
+                           [&](int frame, int frames) {
+                               if (frame % 10 == 0 || frame == frames)
+                                   progress("frame " + std::to_string(frame) + " of " + std::to_string(frames));
+                           });
         ms["sequence"] = watch.ms();
         sequence = {{"as", options.represent}, {"frames", path.frames.size()}, {"video", done.has_video}};
         if (!done.note.empty()) progress(done.note);

@@ -44,8 +44,8 @@ bool ShapeDesk::ask_silhouettes(const PacketAssembler &assembler, const Asker &a
     return is_waiting;
 }
 
-bool ShapeDesk::ask_textures(const SiteModel &model, const std::map<int, View> &views,
-                             const PacketAssembler &assembler, const Asker &asker)
+bool ShapeDesk::ask_textures(const SiteModel &model, const std::map<int, View> &views, const PacketAssembler &assembler,
+                             const Asker &asker)
 {
     if (!options_.with_textures) return false;
     if (!are_textures_planned_) {
@@ -98,7 +98,8 @@ std::vector<std::vector<CarveView>> ShapeDesk::gather(const SiteModel &model, co
     auto all = gather_labels(model, views, assembler);
     if (!options_.with_textures) return all;
     const std::vector<TexturePlan> plans = plan_textures(model, all, options_);
-    for (std::vector<CarveView> &of_obstacle : all) gather_textures(assembler.textures(), plans, options_, &of_obstacle);
+    for (std::vector<CarveView> &of_obstacle : all)
+        gather_textures(assembler.textures(), plans, options_, &of_obstacle);
     return all;
 }
 

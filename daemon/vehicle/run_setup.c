@@ -112,9 +112,9 @@ static bool run_open_vehicle(vehicle_run_t *run, char *error, size_t error_bytes
     }
     run->tile_worker = oc_tile_worker_create();
     run->tiles = (oc_picture_tiles_t){.vehicle = run->vehicle,
-                                     .worker = run->tile_worker,
-                                     .counters = &run->counters,
-                                     .datagram_bytes = vehicle.datagram_bytes};
+                                      .worker = run->tile_worker,
+                                      .counters = &run->counters,
+                                      .datagram_bytes = vehicle.datagram_bytes};
     if (!is_ok || !run->tile_worker) snprintf(error, error_bytes, "out of memory");
     return is_ok && run->tile_worker;
 }

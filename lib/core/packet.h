@@ -170,10 +170,10 @@ typedef struct oc_overhead {
 /* A box that stands on the ground, turned about the vertical. On the wire:
  * 0.1 mm, yaw pi / 512. */
 typedef struct oc_ground_box {
-    double x_m, y_m;                   /* centre */
+    double x_m, y_m;                    /* centre */
     double length_m, width_m, height_m; /* length along yaw */
-    double yaw_rad;                    /* counter-clockwise from +X, [0, pi) */
-    bool is_subject;                   /* its silhouette is asked for; others only stand in the way */
+    double yaw_rad;                     /* counter-clockwise from +X, [0, pi) */
+    bool is_subject;                    /* its silhouette is asked for; others only stand in the way */
 } oc_ground_box_t;
 
 /* The base's pose of a view as a step from the one that the vehicle reported:
@@ -199,10 +199,10 @@ typedef struct oc_silhouette_request {
  * box's projection mean nothing. */
 typedef struct oc_silhouette {
     uint16_t view;
-    uint16_t key;           /* of the request */
-    uint8_t box;            /* index in the request */
-    uint8_t step_px;        /* side of a cell: 1, 2, 4, 8 or 16 */
-    uint16_t col, row;      /* of the first cell, in cells from the image's corner */
+    uint16_t key;            /* of the request */
+    uint8_t box;             /* index in the request */
+    uint8_t step_px;         /* side of a cell: 1, 2, 4, 8 or 16 */
+    uint16_t col, row;       /* of the first cell, in cells from the image's corner */
     uint16_t n_cols, n_rows; /* n_cols * n_rows <= OC_MAX_SILHOUETTE_CELLS */
 } oc_silhouette_t;
 

@@ -16,11 +16,11 @@
 namespace outcrop {
 
 struct AssembleOptions {
-    int vehicle = -1;                  // take packets of this vehicle only; -1: of any (one vehicle per assembler)
-    std::size_t max_views = 4096;      // views, complete or not, and views known from relabels and patches only
-    std::size_t max_blocks = 1u << 20; // pixel blocks in all, 64 bytes each
-    std::size_t max_relabels = 256;    // kept per view
-    std::size_t max_tiles = 1u << 16;  // overhead tiles in all, a datagram each; texture tiles as many again
+    int vehicle = -1;                       // take packets of this vehicle only; -1: of any (one vehicle per assembler)
+    std::size_t max_views = 4096;           // views, complete or not, and views known from relabels and patches only
+    std::size_t max_blocks = 1u << 20;      // pixel blocks in all, 64 bytes each
+    std::size_t max_relabels = 256;         // kept per view
+    std::size_t max_tiles = 1u << 16;       // overhead tiles in all, a datagram each; texture tiles as many again
     std::size_t max_silhouettes = 1u << 15; // a datagram each
 };
 
@@ -134,7 +134,8 @@ private:
     FeedResult take_overhead(const Bytes &datagram);
     FeedResult take_silhouette(const Bytes &datagram);
     FeedResult take_texture(const Bytes &datagram);
-    template <typename Key> FeedResult take_tile(const Key &key, TileBlob fresh, std::map<Key, TileBlob> *tiles) const;
+    template <typename Key>
+    FeedResult take_tile(const Key &key, TileBlob fresh, std::map<Key, TileBlob> *tiles) const;
     FeedResult take_status(const oc_packet_head_t &head, const Bytes &datagram);
     FeedResult take_announce(const Bytes &datagram);
     Entry *entry(int view);

@@ -54,9 +54,9 @@ VoxelGrid grid_of(const Obstacle &box, const std::vector<CarveView> &views, cons
     if (!(longest > 0) || !std::isfinite(longest)) throw std::invalid_argument("carve: the box has no extent");
     VoxelGrid grid;
     grid.min_m = low;
-    grid.size_m = options.voxel_m > 0 ? options.voxel_m
-                                      : std::clamp(finest_pixel(box, views), longest / options.max_side,
-                                                   longest / options.min_side);
+    grid.size_m = options.voxel_m > 0
+                      ? options.voxel_m
+                      : std::clamp(finest_pixel(box, views), longest / options.max_side, longest / options.min_side);
     const Vector3d n = ((high - low) / grid.size_m).array().ceil().max(1.0);
     if (!(n.prod() <= static_cast<double>(options.max_voxels)) || !(n.maxCoeff() <= OC_MAX_GRID_SIDE)) {
         char text[200];
@@ -221,7 +221,8 @@ Carved carve(const Obstacle &box, const std::vector<CarveView> &views, const Car
     fill_down(&grid);
     drop_small_pieces(options.min_piece_share, &grid);
     carved.n_hull = count_occupied(grid);
-    const bool has_colour = std::any_of(telling.begin(), telling.end(), [](const CarveView &v) { return !v.rgb.empty(); });
+    const bool has_colour =
+        std::any_of(telling.begin(), telling.end(), [](const CarveView &v) { return !v.rgb.empty(); });
     if (has_colour && options.with_colour) {
         carved.n_colour = carve_by_colour(telling, options, &grid);
         drop_small_pieces(options.min_piece_share, &grid);

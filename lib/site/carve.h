@@ -26,28 +26,28 @@ struct CarveView {
 };
 
 struct CarveOptions {
-    double voxel_m = 0;           // 0: from the views' pixels and the box, within the next two
-    int max_side = 160;           // voxels along the longest side when voxel_m is 0
+    double voxel_m = 0; // 0: from the views' pixels and the box, within the next two
+    int max_side = 160; // voxels along the longest side when voxel_m is 0
     int min_side = 24;
     std::size_t max_voxels = std::size_t{1} << 26; // refused above
-    double grow_share = 0.15;     // the volume that is looked at, beyond the box on each side
-    int misses = 0;               // views that may call a voxel ground before it is free (t_nS - 1 of the thesis)
+    double grow_share = 0.15;                      // the volume that is looked at, beyond the box on each side
+    int misses = 0;                // views that may call a voxel ground before it is free (t_nS - 1 of the thesis)
     double min_piece_share = 0.03; // of the largest: smaller pieces that touch nothing are taken away
-    bool with_colour = true;      // where views have it
-    int min_colour_views = 3;     // that must see a voxel before their colours count
-    double colour_share = 0.7;    // of them that must agree
-    int colour_tolerance = 24;    // grey levels, each channel, beyond what the pixels round the place span
-    int colour_reach_px = 2;      // how far off the place a colour may lie: poses and edges are not exact
-    int colour_sweeps = 40;       // at most; each takes one layer off
-    bool is_thesis = false;       // colours counted in all views, seen or hidden: t_I = colour_tolerance, t_nI views
-    int thesis_colours = 4;       // t_nI
-    void check() const;           // throws std::invalid_argument
+    bool with_colour = true;       // where views have it
+    int min_colour_views = 3;      // that must see a voxel before their colours count
+    double colour_share = 0.7;     // of them that must agree
+    int colour_tolerance = 10;     // grey levels, each channel, beyond what the pixels round the place span
+    int colour_reach_px = 1;       // how far off the place a colour may lie: poses and edges are not exact
+    int colour_sweeps = 40;        // at most; each takes one layer off
+    bool is_thesis = false;        // colours counted in all views, seen or hidden: t_I = colour_tolerance, t_nI views
+    int thesis_colours = 4;        // t_nI
+    void check() const;            // throws std::invalid_argument
 };
 
 struct Carved {
     VoxelGrid grid;
-    int n_views = 0;         // that said anything
-    std::size_t n_hull = 0;  // occupied by silhouettes alone
+    int n_views = 0;          // that said anything
+    std::size_t n_hull = 0;   // occupied by silhouettes alone
     std::size_t n_colour = 0; // taken away by colour
     std::size_t n_hidden = 0; // occupied, seen by no view
     bool is_empty() const { return n_hull == 0; }

@@ -53,7 +53,8 @@ public:
             int x, y;
             double depth;
             if (!project(grid, cell, &x, &y, &depth)) continue;
-            const int half = std::min(20, static_cast<int>(std::ceil(0.6 * grid.size_m * view_.camera.k.fx_px / depth)));
+            const int half =
+                std::min(20, static_cast<int>(std::ceil(0.6 * grid.size_m * view_.camera.k.fx_px / depth)));
             for (int v = std::max(0, y - half); v <= std::min(depth_.rows - 1, y + half); v++)
                 for (int u = std::max(0, x - half); u <= std::min(depth_.cols - 1, x + half); u++)
                     depth_(v, u) = std::min(depth_(v, u), static_cast<float>(depth));
@@ -106,7 +107,8 @@ bool is_consistent(const std::vector<Glance> &glances, const CarveOptions &optio
     for (const Glance &candidate : glances) {
         const cv::Vec3b &colour = candidate.eye->colour(candidate.x, candidate.y);
         std::size_t n = 0;
-        for (const Glance &glance : glances) n += glance.eye->spans(glance.x, glance.y, colour, options.colour_tolerance);
+        for (const Glance &glance : glances)
+            n += glance.eye->spans(glance.x, glance.y, colour, options.colour_tolerance);
         if (n >= needed) return true;
     }
     return false;
@@ -148,8 +150,7 @@ std::size_t carve_by_colour(const std::vector<CarveView> &views, const CarveOpti
                     glances.push_back({&eye, x, y});
             }
             if (static_cast<int>(glances.size()) < options.min_colour_views) continue;
-            const bool is_body =
-                options.is_thesis ? is_thesis_body(glances, options) : is_consistent(glances, options);
+            const bool is_body = options.is_thesis ? is_thesis_body(glances, options) : is_consistent(glances, options);
             if (!is_body) gone.push_back(grid->index(cell.i, cell.j, cell.k));
         }
         for (const std::size_t v : gone) grid->state[v] = VoxelState::kFree;

@@ -20,7 +20,8 @@ namespace {
 using Eigen::Vector3f;
 using json = nlohmann::json;
 
-template <typename T> void append(std::string *out, T value)
+template <typename T>
+void append(std::string *out, T value)
 {
     char bytes[sizeof value];
     std::memcpy(bytes, &value, sizeof value);
@@ -34,8 +35,7 @@ std::string ply_head(const std::string &comment, std::size_t n_vertices, std::si
     out += "element vertex " + std::to_string(n_vertices) +
            "\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\n"
            "property uchar blue\n";
-    if (n_faces > 0)
-        out += "element face " + std::to_string(n_faces) + "\nproperty list uchar int vertex_indices\n";
+    if (n_faces > 0) out += "element face " + std::to_string(n_faces) + "\nproperty list uchar int vertex_indices\n";
     return out + "end_header\n";
 }
 
@@ -169,16 +169,18 @@ public:
         if (!cv::imencode(".png", bgra, png)) return;
         const int view = buffer_.add_view(std::string(png.begin(), png.end()), 0);
         images_.push_back({{"bufferView", view}, {"mimeType", "image/png"}});
-        materials_.push_back({{"name", "ground"},
-                              {"doubleSided", true},
-                              {"alphaMode", "MASK"},
-                              {"pbrMetallicRoughness",
-                               {{"baseColorTexture", {{"index", 0}}}, {"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}}});
+        materials_.push_back(
+            {{"name", "ground"},
+             {"doubleSided", true},
+             {"alphaMode", "MASK"},
+             {"pbrMetallicRoughness",
+              {{"baseColorTexture", {{"index", 0}}}, {"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}}});
         const auto x0 = static_cast<float>(map.x_min), y1 = static_cast<float>(map.y_max);
         const auto x1 = static_cast<float>(map.x_min + map.rgb.cols * map.metres_per_pixel);
         const auto y0 = static_cast<float>(map.y_max - map.rgb.rows * map.metres_per_pixel);
         std::vector<Vector3f> corners;
-        for (const auto &[x, y] : {std::pair{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}}) corners.push_back(to_gltf({x, y, 0}));
+        for (const auto &[x, y] : {std::pair{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}})
+            corners.push_back(to_gltf({x, y, 0}));
         const json attributes = {{"POSITION", buffer_.add_positions(corners)},
                                  {"NORMAL", buffer_.add_vectors(std::vector<Vector3f>(4, Vector3f(0, 1, 0)))},
                                  {"TEXCOORD_0", buffer_.add_uvs({{0, 1}, {1, 1}, {1, 0}, {0, 0}})}};
@@ -203,7 +205,8 @@ public:
                     const Eigen::Vector3d half = corner.cwiseProduct(box.obb_size) / 2;
                     const Eigen::Vector3d at(c * half.x() - s * half.y(), s * half.x() + c * half.y(), half.z());
                     points.push_back(to_gltf((box.obb_centre + at).cast<float>()));
-                    const Eigen::Vector3d n(c * normal.x() - s * normal.y(), s * normal.x() + c * normal.y(), normal.z());
+                    const Eigen::Vector3d n(c * normal.x() - s * normal.y(), s * normal.x() + c * normal.y(),
+                                            normal.z());
                     normals.push_back(to_gltf(n.cast<float>()));
                 }
                 triangles.push_back({first, first + 1, first + 2});
@@ -262,9 +265,9 @@ public:
 private:
     void add_material(std::array<double, 4> colour, bool is_double_sided)
     {
-        json material = {{"doubleSided", is_double_sided},
-                         {"pbrMetallicRoughness",
-                          {{"baseColorFactor", colour}, {"metallicFactor", 0.0}, {"roughnessFactor", 0.9}}}};
+        json material = {
+            {"doubleSided", is_double_sided},
+            {"pbrMetallicRoughness", {{"baseColorFactor", colour}, {"metallicFactor", 0.0}, {"roughnessFactor", 0.9}}}};
         if (colour[3] < 1) material["alphaMode"] = "BLEND";
         materials_.push_back(material);
     }
@@ -290,7 +293,8 @@ void write_voxels_ply(const std::string &path, const VoxelGrid &grid)
         for (int j = 0; j < grid.ny; j++) {
             for (int i = 0; i < grid.nx; i++) {
                 if (!grid.is_occupied(i, j, k)) continue;
-                const cv::Vec3b colour = grid.colour.empty() ? cv::Vec3b(150, 150, 150) : grid.colour[grid.index(i, j, k)];
+                const cv::Vec3b colour =
+                    grid.colour.empty() ? cv::Vec3b(150, 150, 150) : grid.colour[grid.index(i, j, k)];
                 append_vertex(&body, grid.centre(i, j, k).cast<float>(), colour);
                 n++;
             }

@@ -44,8 +44,7 @@ VoxelCloud::VoxelCloud(const std::vector<Shape> &shapes)
                     if (!grid.is_surface(i, j, k)) continue;
                     const cv::Vec3b colour =
                         grid.colour.empty() ? cv::Vec3b(170, 170, 170) : grid.colour[grid.index(i, j, k)];
-                    body.splats.push_back(
-                        {grid.centre(i, j, k).cast<float>(), shaded(colour, outward(grid, i, j, k))});
+                    body.splats.push_back({grid.centre(i, j, k).cast<float>(), shaded(colour, outward(grid, i, j, k))});
                 }
             }
         }

@@ -38,8 +38,8 @@ void remove_old_frames(const fs::path &folder)
 } // namespace
 
 SequenceReport write_sequence(const std::string &dir, const std::string &as, const SiteModel &model,
-                              const std::vector<Shape> &shapes, const OverheadMap &overhead, const Path &path, const SequenceOptions &options,
-                              const std::function<void(int, int)> &progress)
+                              const std::vector<Shape> &shapes, const OverheadMap &overhead, const Path &path,
+                              const SequenceOptions &options, const std::function<void(int, int)> &progress)
 {
     if (as != "boxes" && as != "voxels") throw std::invalid_argument("obstacles cannot be shown as " + as);
     if (path.frames.empty()) throw std::invalid_argument("the path has no frame");

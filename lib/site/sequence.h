@@ -29,7 +29,7 @@ struct SequenceReport {
 // "boxes" or "voxels" (of `shapes`; obstacles without one stay boxes). progress(done, all) after each frame. Throws std::runtime_error or
 // std::invalid_argument.
 SequenceReport write_sequence(const std::string &dir, const std::string &as, const SiteModel &model,
-                              const std::vector<Shape> &shapes, const OverheadMap &overhead, const Path &path, const SequenceOptions &options,
-                              const std::function<void(int, int)> &progress);
+                              const std::vector<Shape> &shapes, const OverheadMap &overhead, const Path &path,
+                              const SequenceOptions &options, const std::function<void(int, int)> &progress);
 
 } // namespace outcrop

@@ -428,8 +428,8 @@ int gather_textures(const std::map<TextureKey, TileBlob> &textures, const std::v
             if (plan.request.view != view.id) continue;
             for (std::size_t i = 0; i < plan.request.n_tiles; i++) {
                 const int tile = plan.request.tiles[i];
-                const auto blob = textures.find({plan.request.view, plan.request.step_px, plan.request.tile_px,
-                                                 plan.request.tiles[i]});
+                const auto blob = textures.find(
+                    {plan.request.view, plan.request.step_px, plan.request.tile_px, plan.request.tiles[i]});
                 const cv::Rect inside = cv::Rect(tile % across * reach, tile / across * reach, reach, reach) &
                                         cv::Rect(0, 0, width, height);
                 if (blob == textures.end() || inside.area() == 0) continue;

@@ -18,16 +18,16 @@
 namespace outcrop {
 
 struct ShapeOptions {
-    int step_px = 2;           // cells of silhouettes: 1, 2 or 4 px
-    double grow_share = 0.15;  // by which a body may be larger than its points' box on each side, of its largest one
-    bool is_thesis = false;    // silhouettes by the votes of Table 6.1
+    int step_px = 2;          // cells of silhouettes: 1, 2 or 4 px
+    double grow_share = 0.15; // by which a body may be larger than its points' box on each side, of its largest one
+    bool is_thesis = false;   // silhouettes by the votes of Table 6.1
     std::size_t datagram_bytes = 1380;
     bool with_textures = true;
-    int texture_step_px = 2;   // pixels of the view to one of a texture
+    int texture_step_px = 2; // pixels of the view to one of a texture
     int texture_tile_px = 64;
     int texture_quality = 40;
-    int texture_views = 5;     // for each obstacle
-    void check() const;        // throws std::invalid_argument
+    int texture_views = 5; // for each obstacle
+    void check() const;    // throws std::invalid_argument
 };
 
 // A silhouette request, the key its answers carry, and which obstacle each of its boxes is (-1: only in the way).

@@ -18,8 +18,8 @@ struct VoxelGrid {
     Eigen::Vector3d min_m = Eigen::Vector3d::Zero();
     double size_m = 0;
     int nx = 0, ny = 0, nz = 0;
-    std::vector<VoxelState> state;  // x fastest, then y, then z
-    std::vector<cv::Vec3b> colour;  // RGB; empty when there is none
+    std::vector<VoxelState> state; // x fastest, then y, then z
+    std::vector<cv::Vec3b> colour; // RGB; empty when there is none
 
     std::size_t size() const { return state.size(); }
     std::size_t index(int i, int j, int k) const
@@ -41,9 +41,9 @@ struct VoxelGrid {
     // Occupied, with a neighbour across a face that is not; the ground counts as occupied.
     bool is_surface(int i, int j, int k) const
     {
-        return is_occupied(i, j, k) && !(is_occupied(i - 1, j, k) && is_occupied(i + 1, j, k) &&
-                                         is_occupied(i, j - 1, k) && is_occupied(i, j + 1, k) &&
-                                         (k == 0 || is_occupied(i, j, k - 1)) && is_occupied(i, j, k + 1));
+        return is_occupied(i, j, k) &&
+               !(is_occupied(i - 1, j, k) && is_occupied(i + 1, j, k) && is_occupied(i, j - 1, k) &&
+                 is_occupied(i, j + 1, k) && (k == 0 || is_occupied(i, j, k - 1)) && is_occupied(i, j, k + 1));
     }
 };
 

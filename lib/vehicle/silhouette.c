@@ -59,9 +59,10 @@ static size_t bits_of(uint32_t width_px, uint32_t height_px)
 size_t oc_silhouette_size_bytes(uint32_t max_width_px, uint32_t max_height_px)
 {
     const size_t n = (size_t)max_width_px * max_height_px;
-    return oc_arena_cost(3u * n) + oc_arena_cost(4u * n) + 5u * oc_arena_cost(n) +
-           oc_arena_cost(n * sizeof(int16_t)) + oc_arena_cost(N_LINES * max_width_px * sizeof(int32_t)) +
-           oc_arena_cost(N_LINES * max_width_px * sizeof(float)) + 2u * oc_arena_cost(bits_of(max_width_px, max_height_px)) +
+    return oc_arena_cost(3u * n) + oc_arena_cost(4u * n) + 5u * oc_arena_cost(n) + oc_arena_cost(n * sizeof(int16_t)) +
+           oc_arena_cost(N_LINES * max_width_px * sizeof(int32_t)) +
+           oc_arena_cost(N_LINES * max_width_px * sizeof(float)) +
+           2u * oc_arena_cost(bits_of(max_width_px, max_height_px)) +
            oc_arena_cost(6u * OC_SILHOUETTE_SAMPLES * sizeof(float));
 }
 
@@ -112,9 +113,9 @@ static bool boxes_draw(const oc_silhouette_task_t *task, double grow, const oc_s
         }
         /* Wholly behind it stands in nobody's way. */
         const double centre[3] = {task->boxes[i].x_m, task->boxes[i].y_m, 0.5 * task->boxes[i].height_m};
-        const double reach = sqrt(task->boxes[i].length_m * task->boxes[i].length_m +
-                                  task->boxes[i].width_m * task->boxes[i].width_m +
-                                  task->boxes[i].height_m * task->boxes[i].height_m);
+        const double reach =
+            sqrt(task->boxes[i].length_m * task->boxes[i].length_m + task->boxes[i].width_m * task->boxes[i].width_m +
+                 task->boxes[i].height_m * task->boxes[i].height_m);
         const double *R = sight->camera.pose.R, *t = sight->camera.pose.t;
         const double depth = R[6] * centre[0] + R[7] * centre[1] + R[8] * centre[2] + t[2];
         if (depth > -reach) return false;
@@ -251,8 +252,8 @@ static void evidence_fill(oc_silhouette_ws_t *ws, size_t n)
 {
     for (size_t i = 0; i < n; i++) {
         const float difference = fminf((float)ws->difference[i] * 0.25f, MAX_DIFFERENCE);
-        const float e = DIFFERENCE_WEIGHT * difference - LIKENESS_WEIGHT * (float)ws->likeness[i] * 0.01f +
-                        EVIDENCE_OFFSET;
+        const float e =
+            DIFFERENCE_WEIGHT * difference - LIKENESS_WEIGHT * (float)ws->likeness[i] * 0.01f + EVIDENCE_OFFSET;
         ws->evidence[i] = is_judged(ws, i) > 0.0f
                               ? (int16_t)(fminf(fmaxf(e, -MAX_EVIDENCE), MAX_EVIDENCE) * EVIDENCE_SCALE)
                               : (int16_t)0;
@@ -410,7 +411,8 @@ static void cut(const uint8_t *in, uint32_t in_width, uint32_t x0, uint32_t y0, 
 
 static oc_pixel_rect_t grown(const oc_pixel_rect_t *rect, uint32_t width_px, uint32_t height_px)
 {
-    return (oc_pixel_rect_t){rect->x0 > MARGIN_PX ? rect->x0 - MARGIN_PX : 0, rect->y0 > MARGIN_PX ? rect->y0 - MARGIN_PX : 0,
+    return (oc_pixel_rect_t){rect->x0 > MARGIN_PX ? rect->x0 - MARGIN_PX : 0,
+                             rect->y0 > MARGIN_PX ? rect->y0 - MARGIN_PX : 0,
                              rect->x1 + MARGIN_PX < width_px ? rect->x1 + MARGIN_PX : width_px,
                              rect->y1 + MARGIN_PX < height_px ? rect->y1 + MARGIN_PX : height_px};
 }

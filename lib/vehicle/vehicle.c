@@ -38,7 +38,8 @@ static bool config_is_valid(const oc_vehicle_config_t *c)
 
 /* Bytes of the pieces of a block. */
 typedef struct layout {
-    size_t vehicle, views, grey, colour, junctions, votes, sent_indices, sent_labels, solid, outgoing, judoca, silhouette;
+    size_t vehicle, views, grey, colour, junctions, votes, sent_indices, sent_labels, solid, outgoing, judoca,
+        silhouette;
 } layout_t;
 
 static layout_t layout_of(const oc_vehicle_config_t *c)

@@ -105,8 +105,8 @@ static oc_status_t silhouette_encode(oc_vehicle_t *vehicle, oc_silhouette_t *out
     for (; step_px <= MAX_STEP_PX; step_px *= 2u) {
         oc_silhouette_to_cells(rect, labels, step_px, out, cells);
         if ((uint32_t)out->n_cols * out->n_rows > OC_MAX_SILHOUETTE_CELLS) continue;
-        const oc_status_t status = oc_packet_encode_silhouette(&packet, out, cells, buf,
-                                                               vehicle->config.datagram_bytes, n_bytes);
+        const oc_status_t status =
+            oc_packet_encode_silhouette(&packet, out, cells, buf, vehicle->config.datagram_bytes, n_bytes);
         if (status != OC_E_SPACE) return status;
     }
     const uint8_t nothing = OC_LABEL_UNKNOWN;

@@ -102,7 +102,7 @@ static void all_faults_are_told_together(void)
                              ":4: lan_url: \"lo\" is not an LCM URL, as udpm://239.255.76.67:7667?ttl=1\n"
                              ":5: datagram_bytes: 199 is not within 200..1380\n"
                              ":6: patch_quality: 0 is not within 1..31\n"
-                             ":7: as: \"clouds\" is not one of boxes, none\n"
+                             ":7: as: \"clouds\" is not one of boxes, none, voxels\n"
                              ":8: as: is given twice, first in line 7\n"
                              ":9: methot: is no key here: did you mean method?\n"
                              ":10: area[3]: \"nan\" is not finite\n"
@@ -157,14 +157,14 @@ static void the_sample_loads_with_every_key(void)
         if (!is_held_back) freed[n++] = *c;
     }
     freed[n] = '\0';
-    TEST_ASSERT_EQUAL(7, n_freed);
+    TEST_ASSERT_EQUAL(8, n_freed);
     TEST_ASSERT_TRUE_MESSAGE(load(freed), told);
     TEST_ASSERT_EQUAL(1, config.vehicle);
     TEST_ASSERT_EQUAL(1380, config.datagram_bytes);
     TEST_ASSERT_EQUAL(8, config.patch_quality);
     TEST_ASSERT_EQUAL_STRING("boxes", config.represent);
     TEST_ASSERT_EQUAL_STRING("best", config.method);
-    TEST_ASSERT_TRUE(config.has_area && !config.exit_when_settled);
+    TEST_ASSERT_TRUE(config.has_area && !config.exit_when_settled && config.with_textures);
 }
 
 int main(void)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause
- * Fuzz target: any bytes into the packet decoders, then the invariants I1 to I12 of docs/protocol.md.
+ * Fuzz target: any bytes into the packet decoders, then the invariants I1 to I14 of docs/protocol.md.
  *
  * The input is a packet without its CRC, which is added here: random bytes
  * would hardly ever get past it. */
@@ -190,6 +190,52 @@ static void same_overhead_request_again(const oc_packet_head_t *packet, const oc
                           sizeof request->image_from_ground) == 0);
 }
 
+static void check_silhouette(const any_silhouette_t *s)
+{
+    const uint32_t n_cells = (uint32_t)s->head.n_cols * s->head.n_rows;
+    REQUIRE("I13", n_cells >= 1 && n_cells <= ANY_CELLS && s->head.box < OC_MAX_SILHOUETTE_BOXES);
+    REQUIRE("I13", s->head.col + s->head.n_cols <= 4096 && s->head.row + s->head.n_rows <= 4096);
+    REQUIRE("I13", s->head.step_px == 1 || s->head.step_px == 2 || s->head.step_px == 4 || s->head.step_px == 8 ||
+                       s->head.step_px == 16);
+    for (uint32_t i = 0; i < n_cells; i++) {
+        REQUIRE("I13", s->labels[i] <= 2);
+    }
+}
+
+static void check_silhouette_request(const oc_silhouette_request_t *r)
+{
+    REQUIRE("I13", r->n_boxes >= 1 && r->n_boxes <= OC_MAX_SILHOUETTE_BOXES);
+    REQUIRE("I13", r->n_views >= 1 && r->n_views <= OC_MAX_SILHOUETTE_VIEWS);
+    REQUIRE("I13", (r->step_px == 1 || r->step_px == 2 || r->step_px == 4) && r->grow_percent <= 100);
+    for (unsigned i = 0; i < r->n_boxes; i++) {
+        const oc_ground_box_t *box = &r->boxes[i];
+        REQUIRE("I13", box->length_m > 0.0 && box->width_m > 0.0 && box->height_m > 0.0 && box->height_m < 105.0);
+        REQUIRE("I13", fabs(box->x_m) < 13422.0 && fabs(box->y_m) < 13422.0);
+        REQUIRE("I13", box->yaw_rad >= 0.0 && box->yaw_rad < 3.1415927);
+    }
+    for (unsigned i = 0; i < r->n_views; i++) {
+        REQUIRE("I13", i == 0 || r->views[i].view > r->views[i - 1].view);
+        for (int k = 0; k < 3; k++) {
+            REQUIRE("I13", fabs(r->views[i].move_m[k]) < 3.28 && fabs(r->views[i].turn_rad[k]) < 0.66);
+        }
+    }
+}
+
+static void check_texture_request(const oc_packet_head_t *packet, const oc_texture_request_t *r)
+{
+    uint16_t taken;
+    REQUIRE("I14", r->is_cancelled || (r->n_tiles >= 1 && r->n_tiles <= OC_MAX_TEXTURE_TILES));
+    REQUIRE("I14", r->is_cancelled || (r->tile_px >= 16 && r->tile_px <= 128 && r->budget_bytes >= 1));
+    REQUIRE("I14", r->is_cancelled || (r->quality >= 1 && r->quality <= 100));
+    for (unsigned i = 1; i < r->n_tiles; i++) {
+        REQUIRE("I14", r->tiles[i] > r->tiles[i - 1]);
+    }
+    const oc_status_t status = oc_packet_encode_texture_request(packet, r, out, sizeof out, &n_out, &taken);
+    REQUIRE("I12", status == OC_OK && taken == r->n_tiles);
+    REQUIRE("I12", oc_packet_decode_texture_request(out, n_out, &again.texture_request) == OC_OK);
+    REQUIRE("I12", memcmp(&again.texture_request, r, sizeof *r) == 0);
+}
+
 /* Those whose every value has one code only: the same bytes must come out. */
 static void same_bytes_again(const oc_packet_head_t *packet, const uint8_t *buf, size_t n_bytes)
 {
@@ -205,6 +251,14 @@ static void same_bytes_again(const oc_packet_head_t *packet, const uint8_t *buf,
         status = oc_packet_encode_resend(packet, &body.resend, out, sizeof out, &n_out);
     } else if (packet->type == OC_PACKET_RECALL_REQUEST) {
         status = oc_packet_encode_recall(packet, &body.recall, out, sizeof out, &n_out);
+    } else if (packet->type == OC_PACKET_TEXTURE) {
+        status = oc_packet_encode_texture(packet, &body.texture, out, sizeof out, &n_out);
+    } else if (packet->type == OC_PACKET_SILHOUETTE) {
+        status =
+            oc_packet_encode_silhouette(packet, &body.silhouette.head, body.silhouette.labels, out, sizeof out, &n_out);
+    } else if (packet->type == OC_PACKET_SILHOUETTE_REQUEST) {
+        status = oc_packet_encode_silhouette_request(packet, &body.silhouette_request, out, sizeof out, &n_out, &taken);
+        REQUIRE("I13", taken == body.silhouette_request.key);
     } else if (packet->type == OC_PACKET_IMAGE) {
         status = oc_packet_encode_image(packet, &body.image, out, sizeof out, &n_out, &taken);
         /* Margins alike may come as one or as three. */
@@ -242,6 +296,13 @@ static void check_body(const oc_packet_head_t *packet, const uint8_t *buf, size_
         check_bytes(body.overhead.bytes, body.overhead.n_bytes, buf, n_bytes);
         break;
     case OC_PACKET_IMAGE: check_image(&body.image, buf, n_bytes); break;
+    case OC_PACKET_SILHOUETTE: check_silhouette(&body.silhouette); break;
+    case OC_PACKET_SILHOUETTE_REQUEST: check_silhouette_request(&body.silhouette_request); break;
+    case OC_PACKET_TEXTURE:
+        REQUIRE("I14", body.texture.tile_px >= 16 && body.texture.tile_px <= 128);
+        check_bytes(body.texture.bytes, body.texture.n_bytes, buf, n_bytes);
+        break;
+    case OC_PACKET_TEXTURE_REQUEST: check_texture_request(packet, &body.texture_request); return;
     default: break;
     }
     same_bytes_again(packet, buf, n_bytes);

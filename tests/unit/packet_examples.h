@@ -8,7 +8,7 @@
 
 #include "core/packet.h"
 
-#define N_EXAMPLES 15
+#define N_EXAMPLES 20
 
 typedef struct example_packet {
     const char *name;
@@ -195,6 +195,83 @@ static inline oc_status_t example_overhead_request(const oc_packet_head_t *packe
     return oc_packet_encode_overhead_request(packet, &request, out->bytes, sizeof out->bytes, &out->n_bytes, &taken);
 }
 
+/* A disc of obstacle with a hole of unknown, and a crumb, on ground. */
+static inline void example_labels(unsigned n_cols, unsigned n_rows, uint8_t labels[])
+{
+    for (unsigned r = 0; r < n_rows; r++) {
+        for (unsigned c = 0; c < n_cols; c++) {
+            const double x = (c + 0.5) / n_cols * 2.0 - 1.0, y = (r + 0.5) / n_rows * 2.0 - 1.0;
+            const double d = x * x + y * y;
+            uint8_t label = d < 0.7 ? (uint8_t)OC_LABEL_OBSTACLE : (uint8_t)OC_LABEL_GROUND;
+            if (d < 0.7 && y > 0.3) label = OC_LABEL_UNKNOWN;
+            if (r == 2 && c > 3 && c < 6) label = OC_LABEL_OBSTACLE;
+            labels[r * n_cols + c] = label;
+        }
+    }
+}
+
+static inline oc_status_t example_silhouette(const oc_packet_head_t *packet, example_packet_t *out)
+{
+    static uint8_t labels[90 * 70];
+    const oc_silhouette_t silhouette = {
+        .view = 6, .key = 0xbeef, .box = 3, .step_px = 2, .col = 30, .row = 11, .n_cols = 90, .n_rows = 70};
+    example_labels(90, 70, labels);
+    return oc_packet_encode_silhouette(packet, &silhouette, labels, out->bytes, sizeof out->bytes, &out->n_bytes);
+}
+
+static inline oc_status_t example_silhouette_request(const oc_packet_head_t *packet, example_packet_t *out)
+{
+    oc_silhouette_request_t request = {.step_px = 2, .grow_percent = 15, .n_boxes = 3, .n_views = 14};
+    for (int i = 0; i < request.n_boxes; i++) {
+        request.boxes[i] = (oc_ground_box_t){.x_m = 1.25 * i - 2.0,
+                                             .y_m = 0.5 - i,
+                                             .length_m = 0.8 + 0.1 * i,
+                                             .width_m = 0.4,
+                                             .height_m = 0.65,
+                                             .yaw_rad = 0.3 * i,
+                                             .is_subject = i != 1};
+    }
+    for (int i = 0; i < request.n_views; i++) {
+        request.views[i].view = (uint16_t)(3 * i);
+        request.views[i].is_wanted = i % 3 != 0;
+        for (int k = 0; k < 3; k++) {
+            request.views[i].move_m[k] = 0.01 * (k - 1) * i;
+            request.views[i].turn_rad[k] = 0.002 * (1 - k) * i;
+        }
+    }
+    uint16_t key;
+    return oc_packet_encode_silhouette_request(packet, &request, out->bytes, sizeof out->bytes, &out->n_bytes, &key);
+}
+
+static inline oc_status_t example_texture(const oc_packet_head_t *packet, example_packet_t *out)
+{
+    static const uint8_t bytes[] = {'R', 'I', 'F', 'F', 1, 2, 3, 4, 5};
+    const oc_texture_t texture = {.view = 3,
+                                  .step_px = 2,
+                                  .tile_px = 64,
+                                  .tile = 17,
+                                  .codec = OC_CODEC_WEBP,
+                                  .n_bytes = sizeof bytes,
+                                  .bytes = bytes};
+    return oc_packet_encode_texture(packet, &texture, out->bytes, sizeof out->bytes, &out->n_bytes);
+}
+
+static inline oc_status_t example_texture_request(const oc_packet_head_t *packet, bool is_cancelled,
+                                                  example_packet_t *out)
+{
+    oc_texture_request_t request = {.view = 5,
+                                    .is_cancelled = is_cancelled,
+                                    .step_px = 2,
+                                    .tile_px = 64,
+                                    .quality = 40,
+                                    .is_masked = true,
+                                    .budget_bytes = 5000,
+                                    .n_tiles = 9};
+    for (int i = 0; i < 9; i++) request.tiles[i] = (uint16_t)(4 + i * 2);
+    uint16_t taken;
+    return oc_packet_encode_texture_request(packet, &request, out->bytes, sizeof out->bytes, &out->n_bytes, &taken);
+}
+
 /* Returns how many were made: N_EXAMPLES when all went well. */
 static inline int example_packets(example_packet_t packets[N_EXAMPLES])
 {
@@ -202,9 +279,26 @@ static inline int example_packets(example_packet_t packets[N_EXAMPLES])
     const oc_announce_t announce = {.view = 8, .utime_us = 1700000000000001};
     const oc_resend_request_t resend = {.view = 8, .parts = 5};
     const oc_recall_request_t recall = {.from_us = 1700000000000001, .to_us = 1700000030000000};
-    static const char *const names[N_EXAMPLES] = {
-        "view_200", "view_mixed", "view_empty", "view_ties", "patch_coarse",  "patch_fine",       "relabel", "overhead",
-        "status",   "announce",   "image",      "resend",    "patch_request", "overhead_request", "recall"};
+    static const char *const names[N_EXAMPLES] = {"view_200",
+                                                  "view_mixed",
+                                                  "view_empty",
+                                                  "view_ties",
+                                                  "patch_coarse",
+                                                  "patch_fine",
+                                                  "relabel",
+                                                  "overhead",
+                                                  "status",
+                                                  "announce",
+                                                  "image",
+                                                  "resend",
+                                                  "patch_request",
+                                                  "overhead_request",
+                                                  "recall",
+                                                  "silhouette",
+                                                  "silhouette_request",
+                                                  "texture",
+                                                  "texture_request",
+                                                  "texture_cancel"};
     int n = 0;
     n += example_view(&head, 1, 200, 2, 0, false, &packets[0]) == OC_OK;
     n += example_view(&head, 2, 60, 6, 12, true, &packets[1]) == OC_OK;
@@ -224,6 +318,11 @@ static inline int example_packets(example_packet_t packets[N_EXAMPLES])
     n += example_overhead_request(&head, &packets[13]) == OC_OK;
     n += oc_packet_encode_recall(&head, &recall, packets[14].bytes, OC_MAX_DATAGRAM_BYTES, &packets[14].n_bytes) ==
          OC_OK;
+    n += example_silhouette(&head, &packets[15]) == OC_OK;
+    n += example_silhouette_request(&head, &packets[16]) == OC_OK;
+    n += example_texture(&head, &packets[17]) == OC_OK;
+    n += example_texture_request(&head, false, &packets[18]) == OC_OK;
+    n += example_texture_request(&head, true, &packets[19]) == OC_OK;
     for (int i = 0; i < N_EXAMPLES; i++) {
         packets[i].name = names[i];
     }

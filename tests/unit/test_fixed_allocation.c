@@ -87,6 +87,13 @@ static void the_detector_is_as_large_as_the_formula_says(void)
     }
 }
 
+/* docs/design.md (2a), term by term. */
+static size_t silhouettes_formula_bytes(size_t w, size_t h)
+{
+    return c64(3u * w * h) + c64(4u * w * h) + 5u * c64(w * h) + c64(2u * w * h) + 2u * c64(40u * w) +
+           2u * c64(h * ceil_of(w, 8)) + c64(24u * OC_SILHOUETTE_SAMPLES);
+}
+
 /* docs/design.md (1), term by term. */
 static size_t formula_bytes(const oc_vehicle_config_t *c, bool is_printed)
 {
@@ -96,13 +103,16 @@ static size_t formula_bytes(const oc_vehicle_config_t *c, bool is_printed)
     const size_t scratch = c64(n_px) + c64(j * sizeof(oc_junction_t)) + c64(s * sizeof(oc_junction_t));
     const size_t judoca = c64(oc_judoca_size_bytes(c->max_width_px, c->max_height_px, &c->judoca));
     const size_t pixels = c64(n_px) + (c->keep_colour ? c64(3u * n_px) : 0);
-    const size_t lists =
-        c64(j * sizeof(oc_junction_t)) + c64(j * sizeof(oc_ground_votes_t)) + 2u * c64(2u * s) + c64(j);
+    const size_t lists = c64(j * sizeof(oc_junction_t)) + c64(j * sizeof(oc_ground_votes_t)) + 2u * c64(2u * s) +
+                         c64(j) +
+                         c64(c->with_silhouettes ? ceil_of(c->max_width_px, 8) * ceil_of(c->max_height_px, 8) : 0);
+    const size_t silhouettes = c->with_silhouettes ? silhouettes_formula_bytes(c->max_width_px, c->max_height_px) : 0;
     if (is_printed) {
-        printf("state %zu + scratch of a frame %zu + detector %zu + %zu views of %zu pixels and %zu lists\n", state,
-               scratch, judoca, v, pixels, lists);
+        printf("state %zu + scratch of a frame %zu + detector %zu + silhouettes %zu + %zu views of %zu pixels and %zu "
+               "lists\n",
+               state, scratch, judoca, silhouettes, v, pixels, lists);
     }
-    return state + scratch + judoca + v * (pixels + lists);
+    return state + scratch + judoca + silhouettes + v * (pixels + lists);
 }
 
 static void the_block_is_as_large_as_the_formula_says(void)
@@ -115,6 +125,8 @@ static void the_block_is_as_large_as_the_formula_says(void)
     config.stored_views = 5;
     config.max_sent_junctions = 77;
     config.judoca.max_junctions = 123;
+    TEST_ASSERT_EQUAL_size_t(formula_bytes(&config, false), oc_vehicle_size(&config));
+    config.with_silhouettes = false;
     TEST_ASSERT_EQUAL_size_t(formula_bytes(&config, false), oc_vehicle_size(&config));
 }
 

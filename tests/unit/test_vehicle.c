@@ -18,12 +18,15 @@ static void size_grows_with_everything_it_should(void)
 {
     const size_t base = oc_vehicle_size(&config);
     oc_vehicle_config_t c;
+    c = config, c.with_silhouettes = false;
+    TEST_ASSERT_TRUE(oc_vehicle_size(&c) < base);
     c = config, c.stored_views++;
     TEST_ASSERT_TRUE(oc_vehicle_size(&c) > base);
     const size_t per_view = oc_vehicle_size(&c) - base;
     TEST_ASSERT_TRUE(per_view >= 4u * WIDTH * HEIGHT); /* grey and RGB */
     c.stored_views++;
-    TEST_ASSERT_EQUAL(base + 2u * per_view, oc_vehicle_size(&c));
+    const size_t more = oc_vehicle_size(&c) - base; /* the views' own structs round up to a cache line */
+    TEST_ASSERT_TRUE(more <= 2u * per_view + OC_ARENA_ALIGN && more + OC_ARENA_ALIGN >= 2u * per_view);
     c = config, c.max_width_px += 8;
     TEST_ASSERT_TRUE(oc_vehicle_size(&c) > base);
     c = config, c.max_height_px += 8;
