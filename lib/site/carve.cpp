@@ -98,6 +98,26 @@ double cell_size(const Extent &e, const std::vector<CarveView> &views, const Car
     return std::max(at_least, footprint > 0 ? std::min(footprint, at_most) : at_most);
 }
 
+VoxelGrid grid_of(const Extent &e, double cell_m, const CarveOptions &options)
+{
+    VoxelGrid grid;
+    grid.cell_m = cell_m;
+    const Eigen::Vector3d counts = ((e.high - e.low) / cell_m).array().ceil().cwiseMax(1.0);
+    if (!(counts.prod() <= options.max_voxels)) {
+        std::ostringstream text;
+        text << "carve: a grid of " << counts.x() << " x " << counts.y() << " x " << counts.z() << " = "
+             << counts.prod() << " voxels would take " << carving_bytes(counts.prod()) << " bytes; at most "
+             << options.max_voxels << " voxels are allowed";
+        throw std::length_error(text.str());
+    }
+    grid.nx = static_cast<int>(counts.x());
+    grid.ny = static_cast<int>(counts.y());
+    grid.nz = static_cast<int>(counts.z());
+    grid.low = (e.low + e.high) / 2 - counts * (cell_m / 2);
+    grid.low.z() = 0;
+    return grid;
+}
+
 void count_states(Carved *carved)
 {
     const Voxels &v = carved->voxels;
@@ -113,23 +133,67 @@ void count_states(Carved *carved)
             }
 }
 
-void carve_silhouettes(const std::vector<const CarveView *> &views, const CarveOptions &options, Carved *carved)
+// Sides of the grid (low x, high x, low y, high y, low z, high z) that the volume meets.
+std::array<bool, 6> met_sides(const VoxelGrid &g, const std::vector<VoxelState> &states)
 {
-    std::vector<LabelView> labels;
+    std::array<bool, 6> met{};
+    for (int k = 0; k < g.nz; ++k)
+        for (int j = 0; j < g.ny; ++j)
+            for (int i = 0; i < g.nx; ++i) {
+                if (states[g.at(i, j, k)] != VoxelState::kOccupied) continue;
+                met[0] |= i == 0, met[1] |= i == g.nx - 1, met[2] |= j == 0;
+                met[3] |= j == g.ny - 1, met[5] |= k == g.nz - 1;
+            }
+    return met;
+}
+
+struct Silhouettes {
+    std::vector<LabelView> views;
+    std::vector<int> left_out;
+};
+
+Silhouettes silhouettes_of(const std::vector<const CarveView *> &views)
+{
+    Silhouettes result;
     for (const CarveView *view : views) {
         if (view->labels.empty()) continue;
         LabelView label(*view);
-        if (label.says_anything()) labels.push_back(std::move(label));
+        if (label.says_anything()) result.views.push_back(std::move(label));
     }
-    if (options.method == CarveMethod::kBest) {
-        const std::vector<int> wrong = contradicting_views(carved->voxels.grid, labels, options);
-        for (auto v = wrong.rbegin(); v != wrong.rend(); ++v) {
-            carved->views_left_out.insert(carved->views_left_out.begin(), labels[static_cast<std::size_t>(*v)].id());
-            labels.erase(labels.begin() + *v);
+    return result;
+}
+
+void leave_out_contradicting(const VoxelGrid &grid, const CarveOptions &options, Silhouettes *silhouettes)
+{
+    if (options.method == CarveMethod::kThesis) return;
+    const std::vector<int> wrong = contradicting_views(grid, silhouettes->views, options);
+    for (auto v = wrong.rbegin(); v != wrong.rend(); ++v) {
+        const auto at = silhouettes->views.begin() + *v;
+        silhouettes->left_out.push_back(at->id());
+        silhouettes->views.erase(at);
+    }
+    std::sort(silhouettes->left_out.begin(), silhouettes->left_out.end());
+}
+
+// Where a rough carving says that the volume goes on, the extent follows it.
+Extent follow_volume(Extent e, const CarveOptions &options, double cell_m, Silhouettes *silhouettes)
+{
+    constexpr double kRoughness = 3;
+    const Eigen::Vector3d step = options.grow_share * (e.high - e.low);
+    for (int round = 0;; ++round) {
+        const VoxelGrid rough = grid_of(e, kRoughness * cell_m, options);
+        if (round == 0) leave_out_contradicting(rough, options, silhouettes);
+        if (round == options.max_regrows) return e;
+        const auto met =
+            met_sides(rough, carve_hull(rough, silhouettes->views, options.tolerated_misses, options.min_views));
+        bool is_grown = false;
+        for (int axis = 0; axis < 3; ++axis) {
+            const double by = step[axis] * (1 << round);
+            if (met[static_cast<std::size_t>(2 * axis)]) e.low[axis] -= by, is_grown = by > 0;
+            if (met[static_cast<std::size_t>(2 * axis + 1)]) e.high[axis] += by, is_grown = by > 0;
         }
+        if (!is_grown) return e;
     }
-    carved->n_views = static_cast<int>(labels.size());
-    carved->voxels.states = carve_hull(carved->voxels.grid, labels, options.tolerated_misses, options.min_views);
 }
 
 } // namespace
@@ -139,6 +203,7 @@ void CarveOptions::check() const
     demand(voxel_m >= 0 && std::isfinite(voxel_m), "carve: voxel_m");
     demand(auto_voxels >= 1e3 && max_voxels >= 1 && max_voxels <= 1e9, "carve: auto_voxels, max_voxels");
     demand(grow_share >= 0 && grow_share <= 10 && grow_m >= 0 && std::isfinite(grow_m), "carve: grow_share, grow_m");
+    demand(max_regrows >= 0 && max_regrows <= 8, "carve: max_regrows");
     demand(tolerated_misses >= 0 && tolerated_misses < 65536, "carve: tolerated_misses");
     demand(min_views >= 1 && min_views < 65536 && min_views_to_judge >= 3, "carve: min_views, min_views_to_judge");
     demand(min_kept_share >= 0 && min_kept_share < 1, "carve: min_kept_share");
@@ -159,33 +224,23 @@ VoxelGrid grid_for(const Obstacle &box, const std::vector<CarveView> &views, con
 {
     options.check();
     const Extent e = grown_extent(box, options);
-    VoxelGrid grid;
-    grid.cell_m = cell_size(e, views, options);
-    const Eigen::Vector3d counts = ((e.high - e.low) / grid.cell_m).array().ceil().cwiseMax(1.0);
-    if (!(counts.prod() <= options.max_voxels)) {
-        std::ostringstream text;
-        text << "carve: a grid of " << counts.x() << " x " << counts.y() << " x " << counts.z() << " = "
-             << counts.prod() << " voxels would take " << carving_bytes(counts.prod()) << " bytes; at most "
-             << options.max_voxels << " voxels are allowed";
-        throw std::length_error(text.str());
-    }
-    grid.nx = static_cast<int>(counts.x());
-    grid.ny = static_cast<int>(counts.y());
-    grid.nz = static_cast<int>(counts.z());
-    const Eigen::Vector3d middle = (e.low + e.high) / 2;
-    grid.low = middle - counts * (grid.cell_m / 2);
-    grid.low.z() = 0;
-    return grid;
+    return grid_of(e, cell_size(e, views, options), options);
 }
 
 Carved carve_obstacle(const Obstacle &box, const std::vector<CarveView> &views, const CarveOptions &options)
 {
     options.check();
     const std::vector<const CarveView *> in_order = sorted(views);
+    const VoxelGrid first = grid_for(box, views, options); // refuses before anything is computed
+    Silhouettes silhouettes = silhouettes_of(in_order);
+    const Extent e = follow_volume(grown_extent(box, options), options, first.cell_m, &silhouettes);
     Carved carved;
-    carved.voxels.grid = grid_for(box, views, options);
+    carved.voxels.grid = grid_of(e, cell_size(e, views, options), options);
+    carved.views_left_out = silhouettes.left_out;
+    carved.n_views = static_cast<int>(silhouettes.views.size());
     for (const CarveView *view : in_order) carved.n_colour_views += !view->rgb.empty();
-    carve_silhouettes(in_order, options, &carved);
+    carved.voxels.states =
+        carve_hull(carved.voxels.grid, silhouettes.views, options.tolerated_misses, options.min_views);
     if (options.method == CarveMethod::kThesis) {
         if (options.with_colour) carved.n_colour_removed = carve_by_colour_thesis(in_order, options, &carved.voxels);
     } else {

@@ -38,6 +38,7 @@ struct CarveOptions {
     double max_voxels = 16e6; // a grid of more is refused
     double grow_share = 0.12; // of each side of the points' box, beyond it on every side but the ground's
     double grow_m = 0;        // and so much more
+    int max_regrows = 3;      // the volume meets a side of the grid: that side moves out by grow_share (twice, ...)
     // Silhouettes.
     int tolerated_misses = 0; // t_nS: so many views may call a voxel ground and be overruled
     int min_views = 1;        // that must call it obstacle for it to be occupied
@@ -71,7 +72,7 @@ struct Carved {
     bool is_usable() const { return n_occupied > 0; }
 };
 
-// The grid for a box: round its axis-aligned and its oriented form, grown, standing on the ground. Throws
+// The first grid for a box: round its axis-aligned and its oriented form, grown, standing on the ground. Throws
 // std::invalid_argument for a box without extent and std::length_error, with the number of voxels and bytes it would
 // take, when it passes options.max_voxels.
 VoxelGrid grid_for(const Obstacle &box, const std::vector<CarveView> &views, const CarveOptions &options);
@@ -79,7 +80,7 @@ VoxelGrid grid_for(const Obstacle &box, const std::vector<CarveView> &views, con
 // Bytes that a grid takes while it is carved.
 double carving_bytes(double n_voxels);
 
-// Carves the box's surroundings. A voxel is free when more than tolerated_misses views see ground at its centre's
+// Carves the box's surroundings. The grid is that of grid_for, but follows a volume that goes on beyond it. A voxel is free when more than tolerated_misses views see ground at its centre's
 // pixel, else occupied when min_views see an obstacle there, else unknown; pixels outside an image or behind a camera
 // say nothing, nor do unknown ones. The same result for any order of the views. Throws std::invalid_argument for
 // options out of range, invalid cameras, images of another size and ids that appear twice, and as grid_for does.

@@ -13,14 +13,15 @@ constexpr double kNear_m = 1e-6;
 
 } // namespace
 
-std::vector<SurfaceVoxel> surface_of(const Voxels &voxels)
+std::vector<SurfaceVoxel> surface_of(const Voxels &voxels, bool with_bottom)
 {
     const VoxelGrid &grid = voxels.grid;
     std::vector<SurfaceVoxel> surface;
     for (int k = 0; k < grid.nz; ++k)
         for (int j = 0; j < grid.ny; ++j)
             for (int i = 0; i < grid.nx; ++i)
-                if (voxels.is_surface(i, j, k)) surface.push_back({i, j, k, grid.at(i, j, k)});
+                if (voxels.is_surface(i, j, k) || (with_bottom && k == 0 && voxels.is_occupied(i, j, k)))
+                    surface.push_back({i, j, k, grid.at(i, j, k)});
     return surface;
 }
 
@@ -36,8 +37,8 @@ GridCamera::GridCamera(const oc_camera_t &camera, const VoxelGrid &grid)
         for (int column = 0; column < 3; ++column) m[column] = q[column] * grid.cell_m;
         m[3] = q[0] * first.x() + q[1] * first.y() + q[2] * first.z() + q[3];
     }
-    // A cube seen along its edges is a square one cell wide, from anywhere else it is wider.
-    half_px_m_ = 0.5 * grid.cell_m * std::max(camera.k.fx_px, camera.k.fy_px);
+    // A layer of cells turned by 45 degrees in the image leaves holes between splats that are not sqrt(2) cells wide.
+    half_px_m_ = 0.5 * std::sqrt(2.0) * grid.cell_m * std::max(camera.k.fx_px, camera.k.fy_px);
 }
 
 VoxelPixel GridCamera::project(int i, int j, int k) const

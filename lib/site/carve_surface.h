@@ -17,8 +17,8 @@ struct SurfaceVoxel {
     std::size_t at = 0; // in the grid
 };
 
-// Occupied voxels with a free or unknown neighbour, in the grid's order.
-std::vector<SurfaceVoxel> surface_of(const Voxels &voxels);
+// Occupied voxels with a free or unknown neighbour, in the grid's order. with_bottom: also those on the ground.
+std::vector<SurfaceVoxel> surface_of(const Voxels &voxels, bool with_bottom = false);
 
 struct VoxelPixel {
     double x_px = 0, y_px = 0, depth_m = 0; // depth <= 0: behind
