@@ -7,6 +7,10 @@
 #include <benchmark/benchmark.h>
 #include <opencv2/core.hpp>
 
+#include "site/carve_box.h"
+#include "site/mesh.h"
+#include "site/render_voxels.h"
+
 namespace outcrop::bench {
 namespace {
 
@@ -27,6 +31,12 @@ double cell_for(const Obstacle &box, const std::vector<CarveView> &views, double
     return std::cbrt((grid.high() - grid.low).prod() / n);
 }
 
+void draw(benchmark::State &state, const VoxelCloud &cloud, const oc_camera_t &camera)
+{
+    for (auto _ : state) benchmark::DoNotOptimize(render_voxels(cloud, camera).depth.data);
+    state.counters["surface"] = static_cast<double>(cloud.size());
+}
+
 } // namespace
 
 void run_speed(const Obstacle &box, std::vector<CarveView> views)
@@ -35,6 +45,7 @@ void run_speed(const Obstacle &box, std::vector<CarveView> views)
     if (views.size() > kViews) views.resize(kViews);
     CarveOptions plain;
     plain.with_colour = false;
+    plain.max_regrows = 0; // exactly the million
     plain.voxel_m = cell_for(box, views, 1e6, plain);
     CarveOptions coloured = plain;
     coloured.with_colour = true;
@@ -51,6 +62,27 @@ void run_speed(const Obstacle &box, std::vector<CarveView> views)
     })->Unit(benchmark::kMillisecond);
     benchmark::RegisterBenchmark("carve/colour", [&](benchmark::State &s) {
         carve(s, views, coloured);
+    })->Unit(benchmark::kMillisecond);
+    const Carved whole = carve_obstacle(box, views, coloured);
+    benchmark::RegisterBenchmark("mesh", [&](benchmark::State &s) {
+        std::size_t n = 0;
+        for (auto _ : s) n = mesh_of(whole.voxels).triangles.size();
+        s.counters["triangles"] = static_cast<double>(n);
+    })->Unit(benchmark::kMillisecond);
+    VoxelCloud cloud;
+    cloud.add(1, whole.voxels);
+    benchmark::RegisterBenchmark("draw/one", [&](benchmark::State &s) {
+        draw(s, cloud, views.front().camera);
+    })->Unit(benchmark::kMillisecond);
+    // As many obstacles as a million voxels of surface take.
+    VoxelCloud crowd;
+    while (crowd.size() < 1000000) crowd.add(1, whole.voxels);
+    benchmark::RegisterBenchmark("draw/million_surface", [&](benchmark::State &s) {
+        draw(s, crowd, views.front().camera);
+    })->Unit(benchmark::kMillisecond);
+    const FinalBoxOptions defaults;
+    benchmark::RegisterBenchmark("final_box", [&](benchmark::State &s) {
+        for (auto _ : s) benchmark::DoNotOptimize(final_box(box, {}, whole, views, defaults));
     })->Unit(benchmark::kMillisecond);
     benchmark::RunSpecifiedBenchmarks();
 }
