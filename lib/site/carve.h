@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Carving: from silhouettes, and colour where it was bought, to the voxels of an obstacle (thesis 6.4, 6.5, 8.4).
+// Carving: from silhouettes, and colour where it was bought, to the voxels of an obstacle.
 #pragma once
 
-#include <cstddef>
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -25,50 +25,65 @@ struct CarveView {
     cv::Mat1b known;      // 255 where rgb is
 };
 
+enum class CarveMethod {
+    kBest,
+    kThesis // thesis 6.4.3: t_nS decides the silhouettes' say, t_I and t_nI the colours', without visibility
+};
+
 struct CarveOptions {
-    double voxel_m = 0; // 0: from the views' pixels and the box, within the next two
-    int max_side = 160; // voxels along the longest side when voxel_m is 0
-    int min_side = 24;
-    std::size_t max_voxels = std::size_t{1} << 26; // refused above
-    double grow_share = 0.15;                      // the volume that is looked at, beyond the box on each side
-    int misses = 0;                // views that may call a voxel ground before it is free (t_nS - 1 of the thesis)
-    double min_piece_share = 0.03; // of the largest: smaller pieces that touch nothing are taken away
-    bool with_colour = true;       // where views have it
-    int min_colour_views = 3;      // that must see a voxel before their colours count
-    double colour_share = 0.7;     // of them that must agree
-    int colour_tolerance = 10;     // grey levels, each channel, beyond what the pixels round the place span
-    int colour_reach_px = 1;       // how far off the place a colour may lie: poses and edges are not exact
-    int colour_sweeps = 40;        // at most; each takes one layer off
-    bool is_thesis = false;        // colours counted in all views, seen or hidden: t_I = colour_tolerance, t_nI views
-    int thesis_colours = 4;        // t_nI
-    void check() const;            // throws std::invalid_argument
+    CarveMethod method = CarveMethod::kBest;
+    // The grid.
+    double voxel_m = 0;       // 0: a pixel's footprint at the box, but no more than auto_voxels of them
+    double auto_voxels = 1e6; // the most that the automatic choice makes
+    double max_voxels = 16e6; // a grid of more is refused
+    double grow_share = 0.12; // of each side of the points' box, beyond it on every side but the ground's
+    double grow_m = 0;        // and so much more
+    int max_regrows = 3;      // the volume meets a side of the grid: that side moves out by grow_share (twice, ...)
+    // Silhouettes.
+    int tolerated_misses = 0; // t_nS: so many views may call a voxel ground and be overruled
+    int min_views = 1;        // that must call it obstacle for it to be occupied
+    // A view alone against all others that would leave less than this share of what they agree on is left out.
+    double min_kept_share = 0.05;
+    int min_views_to_judge = 4; // views; with fewer nobody is left out
+    // Colour: the voxel's colours in the views that see it must agree.
+    bool with_colour = true;
+    double max_difference = 40; // grey levels, beyond the spread in the three by three pixels round it
+    int min_colour_views = 3;   // that must see a voxel before its colours can remove it
+    double min_agreeing = 0.5;  // share of these views that must agree
+    int max_sweeps = 24;        // each peels one layer
+    double max_removed = 0.35;  // of the hull's volume; a sweep that would pass it is the last
+    // Thesis.
+    double thesis_difference = 60; // t_I, summed over the channels / 3
+    int thesis_agreeing = 4;       // t_nI
+    // Shape, kBest only.
+    int close_cells = 1;          // gaps up to twice this are closed
+    int open_cells = 0;           // spurs up to twice this are taken off (they become unknown)
+    double min_part_share = 0.02; // of the largest part; smaller loose parts become unknown
+    void check() const;           // throws std::invalid_argument
 };
 
 struct Carved {
-    VoxelGrid grid;
-    int n_views = 0;          // that said anything
-    std::size_t n_hull = 0;   // occupied by silhouettes alone
-    std::size_t n_colour = 0; // taken away by colour
-    std::size_t n_hidden = 0; // occupied, seen by no view
-    bool is_empty() const { return n_hull == 0; }
+    Voxels voxels;
+    std::vector<int> views_left_out; // ids of views that contradict all others
+    int n_views = 0;                 // that said anything
+    int n_colour_views = 0;
+    std::size_t n_occupied = 0, n_surface = 0, n_free = 0, n_unknown = 0;
+    std::size_t n_colour_removed = 0;
+    bool is_usable() const { return n_occupied > 0; }
 };
 
-// Voxels of the box grown by grow_share, standing on the ground. A voxel is free when more than `misses` views that show
-// its place call it ground, occupied when it is not free and a view calls it obstacle, else unknown; what is unknown
-// below something occupied is occupied, because obstacles stand on the ground. Pixels outside an image or behind a
-// camera say nothing. Throws std::runtime_error with the size it would take for a grid that is larger than max_voxels.
-// Deterministic. 1 M voxels x 8 views: about 100 ms on one core.
-Carved carve(const Obstacle &box, const std::vector<CarveView> &views, const CarveOptions &options = {});
+// The first grid for a box: round its axis-aligned and its oriented form, grown, standing on the ground. Throws
+// std::invalid_argument for a box without extent and std::length_error, with the number of voxels and bytes it would
+// take, when it passes options.max_voxels.
+VoxelGrid grid_for(const Obstacle &box, const std::vector<CarveView> &views, const CarveOptions &options);
 
-// Box of the points and of the volume together. Points lie on the body but may miss its ends; the volume holds the body
-// but is too large where views are few, most at its top. A side that the points' box has beyond the volume's is drawn
-// in; one that the volume has far beyond the points' is drawn out, by what is more than a volume usually is too large.
-struct FinalBoxOptions {
-    double trim_share = 0.001;     // of the volume's surface that may lie outside at each end
-    double inward_trust = 0.8;     // of the way to the volume's side
-    double side_dead_share = 0.06; // of the box's side: beyond the points' side by less means nothing
-    double top_dead_share = 0.2;
-};
-Obstacle final_box(const Obstacle &points_box, const Carved &carved, const FinalBoxOptions &options = {});
+// Bytes that a grid takes while it is carved.
+double carving_bytes(double n_voxels);
+
+// Carves the box's surroundings. The grid is that of grid_for, but follows a volume that goes on beyond it. A voxel is free when more than tolerated_misses views see ground at its centre's
+// pixel, else occupied when min_views see an obstacle there, else unknown; pixels outside an image or behind a camera
+// say nothing, nor do unknown ones. The same result for any order of the views. Throws std::invalid_argument for
+// options out of range, invalid cameras, images of another size and ids that appear twice, and as grid_for does.
+Carved carve_obstacle(const Obstacle &box, const std::vector<CarveView> &views, const CarveOptions &options = {});
 
 } // namespace outcrop

@@ -1,194 +1,238 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Visibility by a depth buffer of the surface voxels in each view, renewed every sweep.
+// Generalised voxel colouring: a voxel is judged by the views in which no other voxel hides it.
 #include "site/carve_colour.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+#include <deque>
 
 #include <opencv2/imgproc.hpp>
+
+#include "site/carve_surface.h"
 
 namespace outcrop {
 namespace {
 
-using Eigen::Vector3d;
+using Colours = std::vector<cv::Vec3f>;
 
-const cv::Vec3b kNoColour(150, 150, 150);
-
-struct Cell {
-    int i, j, k;
+// A view's colours: the lowest and highest in the three by three pixels round each, so that an edge seen half a pixel
+// aside is no disagreement.
+struct ColourView {
+    GridCamera camera;
+    cv::Mat3b mean, low, high;
+    cv::Mat1b known;
+    cv::Mat1f depth;
+    cv::Vec3f gain{1, 1, 1};
 };
 
-std::vector<Cell> surface_of(const VoxelGrid &grid)
+std::vector<ColourView> prepare(const std::vector<const CarveView *> &views, const VoxelGrid &grid)
 {
-    std::vector<Cell> surface;
-    for (int k = 0; k < grid.nz; k++)
-        for (int j = 0; j < grid.ny; j++)
-            for (int i = 0; i < grid.nx; i++)
-                if (grid.is_surface(i, j, k)) surface.push_back({i, j, k});
-    return surface;
+    std::vector<ColourView> out;
+    for (const CarveView *view : views) {
+        if (view->rgb.empty()) continue;
+        ColourView v{GridCamera(view->camera, grid), view->rgb, {}, {}, {}, {}};
+        const cv::Mat box = cv::Mat::ones(3, 3, CV_8U);
+        cv::erode(view->rgb, v.low, box);
+        cv::dilate(view->rgb, v.high, box);
+        // A pixel beside an unknown one has no full neighbourhood.
+        cv::erode(view->known, v.known, box);
+        out.push_back(v);
+    }
+    return out;
 }
 
-// A view with the nearest depth of the surface at each pixel.
-class Eye {
-public:
-    Eye(const CarveView &view, int reach_px) : view_(view)
-    {
-        if (view.rgb.empty()) return;
-        const cv::Mat kernel = cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * reach_px + 1, 2 * reach_px + 1));
-        cv::Mat low = view.rgb.clone(), high = view.rgb.clone();
-        low.setTo(cv::Scalar(255, 255, 255), view.known == 0); // what is not known widens nothing
-        high.setTo(cv::Scalar(0, 0, 0), view.known == 0);
-        cv::erode(low, low_, kernel);
-        cv::dilate(high, high_, kernel);
-    }
-
-    bool has_colour() const { return !view_.rgb.empty(); }
-
-    void see(const VoxelGrid &grid, const std::vector<Cell> &surface)
-    {
-        depth_ = cv::Mat1f(view_.labels.size(), std::numeric_limits<float>::infinity());
-        for (const Cell &cell : surface) {
-            int x, y;
-            double depth;
-            if (!project(grid, cell, &x, &y, &depth)) continue;
-            const int half =
-                std::min(20, static_cast<int>(std::ceil(0.6 * grid.size_m * view_.camera.k.fx_px / depth)));
-            for (int v = std::max(0, y - half); v <= std::min(depth_.rows - 1, y + half); v++)
-                for (int u = std::max(0, x - half); u <= std::min(depth_.cols - 1, x + half); u++)
-                    depth_(v, u) = std::min(depth_(v, u), static_cast<float>(depth));
-        }
-    }
-
-    // Where the voxel shows, if nothing is before it or that is not asked.
-    bool shows(const VoxelGrid &grid, const Cell &cell, bool even_hidden, int *x, int *y) const
-    {
-        double depth;
-        if (!project(grid, cell, x, y, &depth)) return false;
-        return even_hidden || depth <= static_cast<double>(depth_(*y, *x)) + 1.8 * grid.size_m;
-    }
-
-    bool is_known(int x, int y) const { return has_colour() && view_.known(y, x) != 0; }
-    const cv::Vec3b &colour(int x, int y) const { return view_.rgb(y, x); }
-    bool spans(int x, int y, const cv::Vec3b &colour, int tolerance) const
-    {
-        const cv::Vec3b &low = low_(y, x), &high = high_(y, x);
-        for (int c = 0; c < 3; c++)
-            if (colour[c] < low[c] - tolerance || colour[c] > high[c] + tolerance) return false;
-        return true;
-    }
-
-private:
-    bool project(const VoxelGrid &grid, const Cell &cell, int *x, int *y, double *depth) const
-    {
-        const Vector3d at = grid.centre(cell.i, cell.j, cell.k);
-        double u, v;
-        *depth = oc_camera_project(&view_.camera, at.data(), &u, &v);
-        if (!(*depth > 0) || !(u > -0.5 && v > -0.5)) return false;
-        *x = static_cast<int>(u + 0.5), *y = static_cast<int>(v + 0.5);
-        return *x < view_.labels.cols && *y < view_.labels.rows;
-    }
-
-    const CarveView &view_;
-    cv::Mat3b low_, high_;
-    cv::Mat1f depth_;
+struct Sample {
+    cv::Vec3f low, high, mean;
+    std::size_t view;
 };
 
-struct Glance {
-    const Eye *eye;
-    int x, y;
-};
-
-// Do enough of the views that see it have a place nearby of one colour?
-bool is_consistent(const std::vector<Glance> &glances, const CarveOptions &options)
+cv::Vec3f scaled(const cv::Vec3b &c, const cv::Vec3f &gain)
 {
-    const auto needed = static_cast<std::size_t>(std::ceil(options.colour_share * static_cast<double>(glances.size())));
-    for (const Glance &candidate : glances) {
-        const cv::Vec3b &colour = candidate.eye->colour(candidate.x, candidate.y);
-        std::size_t n = 0;
-        for (const Glance &glance : glances)
-            n += glance.eye->spans(glance.x, glance.y, colour, options.colour_tolerance);
-        if (n >= needed) return true;
-    }
-    return false;
+    return cv::Vec3f(c).mul(gain);
 }
 
-// Thesis Eq 6.11: how many pairs of views, hidden or not, agree; fewer than t_nI is no body.
-bool is_thesis_body(const std::vector<Glance> &glances, const CarveOptions &options)
+// What the views that see the voxel say. slack_m: so much behind the nearest splat is still seen.
+void samples_of(const std::vector<ColourView> &views, const SurfaceVoxel &voxel, double slack_m,
+                std::vector<Sample> *samples)
 {
-    int most = 0;
-    for (const Glance &a : glances) {
-        int n = 0;
-        for (const Glance &b : glances) {
-            int difference = 0;
-            for (int c = 0; c < 3; c++) difference += std::abs(a.eye->colour(a.x, a.y)[c] - b.eye->colour(b.x, b.y)[c]);
-            n += difference <= options.colour_tolerance;
-        }
-        most = std::max(most, n);
+    samples->clear();
+    for (std::size_t v = 0; v < views.size(); ++v) {
+        const ColourView &view = views[v];
+        const VoxelPixel at = view.camera.project(voxel.i, voxel.j, voxel.k);
+        if (!(at.depth_m > 0)) continue;
+        const cv::Point px(cvRound(at.x_px), cvRound(at.y_px));
+        if (!view.camera.image().contains(px) || !view.known(px)) continue;
+        if (at.depth_m > static_cast<double>(view.depth(px)) + slack_m) continue;
+        samples->push_back(
+            {scaled(view.low(px), view.gain), scaled(view.high(px), view.gain), scaled(view.mean(px), view.gain), v});
     }
-    return most >= options.thesis_colours;
+}
+
+// Largest channel's gap between the two ranges; 0 when they overlap.
+float gap(const Sample &a, const Sample &b)
+{
+    float worst = 0;
+    for (int c = 0; c < 3; ++c) worst = std::max({worst, a.low[c] - b.high[c], b.low[c] - a.high[c]});
+    return worst;
+}
+
+bool is_consistent(const std::vector<Sample> &samples, const CarveOptions &options)
+{
+    const std::size_t n = samples.size();
+    if (n < static_cast<std::size_t>(options.min_colour_views)) return true;
+    std::size_t most = 0;
+    for (const Sample &a : samples) {
+        const auto agrees = [&](const Sample &b) { return static_cast<double>(gap(a, b)) <= options.max_difference; };
+        most = std::max(most, static_cast<std::size_t>(std::count_if(samples.begin(), samples.end(), agrees)));
+    }
+    return most >= 2 && static_cast<double>(most) >= options.min_agreeing * static_cast<double>(n);
+}
+
+float median(std::vector<float> *values)
+{
+    const auto middle = values->begin() + static_cast<std::ptrdiff_t>(values->size() / 2);
+    std::nth_element(values->begin(), middle, values->end());
+    return *middle;
+}
+
+cv::Vec3f median_colour(const std::vector<Sample> &samples)
+{
+    cv::Vec3f colour;
+    std::vector<float> values(samples.size());
+    for (int c = 0; c < 3; ++c) {
+        std::transform(samples.begin(), samples.end(), values.begin(), [&](const Sample &s) { return s.mean[c]; });
+        colour[c] = median(&values);
+    }
+    return colour;
+}
+
+void see_surface(const std::vector<SurfaceVoxel> &surface, std::vector<ColourView> *views)
+{
+    for (ColourView &view : *views) view.depth = depth_of_surface(surface, view.camera);
+}
+
+// Exposure differs between views: each gets the factor per channel that brings it to the others' median.
+void balance(const std::vector<SurfaceVoxel> &surface, double slack_m, std::vector<ColourView> *views)
+{
+    constexpr float kMinLevel = 8, kMaxLevel = 247, kMaxGain = 2.5F;
+    constexpr std::size_t kMinSamples = 50;
+    std::vector<std::array<std::vector<float>, 3>> ratios(views->size());
+    std::vector<Sample> samples;
+    const std::size_t step = std::max<std::size_t>(1, surface.size() / 20000);
+    for (std::size_t n = 0; n < surface.size(); n += step) {
+        samples_of(*views, surface[n], slack_m, &samples);
+        if (samples.size() < 3) continue;
+        const cv::Vec3f middle = median_colour(samples);
+        for (const Sample &s : samples)
+            for (int c = 0; c < 3; ++c)
+                if (s.mean[c] >= kMinLevel && s.mean[c] <= kMaxLevel && middle[c] >= kMinLevel)
+                    ratios[s.view][static_cast<std::size_t>(c)].push_back(middle[c] / s.mean[c]);
+    }
+    for (std::size_t v = 0; v < views->size(); ++v)
+        for (int c = 0; c < 3; ++c) {
+            auto &values = ratios[v][static_cast<std::size_t>(c)];
+            if (values.size() < kMinSamples) continue;
+            (*views)[v].gain[c] = std::clamp(median(&values), 1 / kMaxGain, kMaxGain);
+        }
 }
 
 } // namespace
 
-std::size_t carve_by_colour(const std::vector<CarveView> &views, const CarveOptions &options, VoxelGrid *grid)
+std::size_t carve_by_colour(const std::vector<const CarveView *> &views, const CarveOptions &options, Voxels *voxels)
 {
-    std::vector<Eye> eyes;
-    for (const CarveView &view : views)
-        if (!view.rgb.empty()) eyes.emplace_back(view, options.colour_reach_px);
-    std::size_t n_gone = 0;
-    for (int sweep = 0; sweep < options.colour_sweeps; sweep++) {
-        const std::vector<Cell> surface = surface_of(*grid);
-        for (Eye &eye : eyes) eye.see(*grid, surface);
-        std::vector<std::size_t> gone;
-        for (const Cell &cell : surface) {
-            std::vector<Glance> glances;
-            for (const Eye &eye : eyes) {
-                int x, y;
-                if (eye.shows(*grid, cell, options.is_thesis, &x, &y) && eye.is_known(x, y))
-                    glances.push_back({&eye, x, y});
-            }
-            if (static_cast<int>(glances.size()) < options.min_colour_views) continue;
-            const bool is_body = options.is_thesis ? is_thesis_body(glances, options) : is_consistent(glances, options);
-            if (!is_body) gone.push_back(grid->index(cell.i, cell.j, cell.k));
+    std::vector<ColourView> eyes = prepare(views, voxels->grid);
+    if (eyes.size() < static_cast<std::size_t>(options.min_colour_views)) return 0;
+    const double slack_m = voxels->grid.cell_m;
+    const auto hull =
+        static_cast<double>(std::count(voxels->states.begin(), voxels->states.end(), VoxelState::kOccupied));
+    std::size_t n_removed = 0;
+    std::vector<Sample> samples;
+    for (int sweep = 0; sweep < options.max_sweeps; ++sweep) {
+        const std::vector<SurfaceVoxel> surface = surface_of(*voxels);
+        see_surface(surface, &eyes);
+        if (sweep == 0) balance(surface, slack_m, &eyes);
+        std::vector<std::size_t> bad;
+        for (const SurfaceVoxel &voxel : surface) {
+            samples_of(eyes, voxel, slack_m, &samples);
+            if (!is_consistent(samples, options)) bad.push_back(voxel.at);
         }
-        for (const std::size_t v : gone) grid->state[v] = VoxelState::kFree;
-        n_gone += gone.size();
-        if (gone.size() * 1000 < surface.size()) break;
+        if (bad.empty() || static_cast<double>(n_removed + bad.size()) > options.max_removed * hull) break;
+        for (const std::size_t at : bad) voxels->states[at] = VoxelState::kUnknown;
+        n_removed += bad.size();
     }
-    return n_gone;
+    return n_removed;
 }
 
-std::size_t colour_voxels(const std::vector<CarveView> &views, VoxelGrid *grid)
+std::size_t carve_by_colour_thesis(const std::vector<const CarveView *> &views, const CarveOptions &options,
+                                   Voxels *voxels)
 {
-    std::vector<Eye> eyes;
-    for (const CarveView &view : views) eyes.emplace_back(view, 0);
-    const std::vector<Cell> surface = surface_of(*grid);
-    for (Eye &eye : eyes) eye.see(*grid, surface);
-    grid->colour.assign(grid->size(), kNoColour);
-    std::size_t n_seen = 0;
-    for (const Cell &cell : surface) {
-        std::array<std::vector<int>, 3> values;
-        bool is_seen = false;
-        for (const Eye &eye : eyes) {
-            int x, y;
-            if (!eye.shows(*grid, cell, false, &x, &y)) continue;
-            is_seen = true;
-            if (!eye.is_known(x, y)) continue;
-            for (std::size_t c = 0; c < 3; c++) values[c].push_back(eye.colour(x, y)[static_cast<int>(c)]);
-        }
-        n_seen += is_seen;
-        if (values[0].empty()) continue;
-        cv::Vec3b &colour = grid->colour[grid->index(cell.i, cell.j, cell.k)];
-        for (std::size_t c = 0; c < 3; c++) {
-            auto middle = values[c].begin() + static_cast<std::ptrdiff_t>(values[c].size() / 2);
-            std::nth_element(values[c].begin(), middle, values[c].end());
-            colour[static_cast<int>(c)] = static_cast<std::uint8_t>(*middle);
+    const std::vector<ColourView> eyes = prepare(views, voxels->grid);
+    if (eyes.empty()) return 0;
+    const VoxelGrid &grid = voxels->grid;
+    std::size_t n_removed = 0;
+    std::vector<cv::Vec3i> colours;
+    for (int k = 0; k < grid.nz; ++k)
+        for (int j = 0; j < grid.ny; ++j)
+            for (int i = 0; i < grid.nx; ++i) {
+                if (!voxels->is_occupied(i, j, k)) continue;
+                colours.clear();
+                for (const ColourView &view : eyes) {
+                    const VoxelPixel at = view.camera.project(i, j, k);
+                    const cv::Point px(cvRound(at.x_px), cvRound(at.y_px));
+                    if (at.depth_m > 0 && view.camera.image().contains(px) && view.known(px))
+                        colours.push_back(cv::Vec3i(view.mean(px)));
+                }
+                int most = 0;
+                for (const cv::Vec3i &a : colours) {
+                    int n = 0;
+                    for (const cv::Vec3i &b : colours)
+                        n += std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2]) <
+                             3 * options.thesis_difference;
+                    most = std::max(most, n - 1); // itself not counted
+                }
+                if (most >= options.thesis_agreeing) continue;
+                voxels->states[grid.at(i, j, k)] = VoxelState::kUnknown;
+                ++n_removed;
+            }
+    return n_removed;
+}
+
+void colour_voxels(const std::vector<const CarveView *> &views, Voxels *voxels)
+{
+    voxels->colours.clear();
+    std::vector<ColourView> eyes = prepare(views, voxels->grid);
+    if (eyes.empty()) return;
+    const VoxelGrid &grid = voxels->grid;
+    const std::vector<SurfaceVoxel> surface = surface_of(*voxels);
+    see_surface(surface, &eyes);
+    balance(surface, grid.cell_m, &eyes);
+    voxels->colours.assign(grid.size(), {200, 200, 200});
+    std::vector<std::uint8_t> is_done(grid.size(), 0);
+    std::deque<SurfaceVoxel> front;
+    std::vector<Sample> samples;
+    for (const SurfaceVoxel &voxel : surface) {
+        samples_of(eyes, voxel, grid.cell_m, &samples);
+        if (samples.empty()) continue;
+        voxels->colours[voxel.at] = cv::Vec3b(median_colour(samples));
+        is_done[voxel.at] = 1;
+        front.push_back(voxel);
+    }
+    // Inwards and along the surface, ring by ring.
+    static constexpr int kSteps[6][3] = {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}};
+    while (!front.empty()) {
+        const SurfaceVoxel from = front.front();
+        front.pop_front();
+        for (const auto &step : kSteps) {
+            const int i = from.i + step[0], j = from.j + step[1], k = from.k + step[2];
+            if (!voxels->is_occupied(i, j, k)) continue;
+            const std::size_t at = grid.at(i, j, k);
+            if (is_done[at]) continue;
+            is_done[at] = 1;
+            voxels->colours[at] = voxels->colours[from.at];
+            front.push_back({i, j, k, at});
         }
     }
-    const auto n = static_cast<std::size_t>(std::count(grid->state.begin(), grid->state.end(), VoxelState::kOccupied));
-    return n - n_seen;
 }
 
 } // namespace outcrop

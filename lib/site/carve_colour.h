@@ -1,20 +1,23 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Colour in carving: voxels that different views see in different colours are not there.
+// Colour: which voxels the views that see them agree on, and the colour they have.
 #pragma once
 
-#include <cstddef>
 #include <vector>
 
 #include "site/carve.h"
 
 namespace outcrop {
 
-// Takes away surface voxels whose colours do not agree in the views that see them, sweep by sweep (space carving with a
-// tolerance for the place; thesis 6.5 when options.is_thesis). Returns how many went.
-std::size_t carve_by_colour(const std::vector<CarveView> &views, const CarveOptions &options, VoxelGrid *grid);
+// Peels surface voxels on whose colour the views that see them do not agree. They become unknown, not free: light can
+// fool colours. Returns how many.
+std::size_t carve_by_colour(const std::vector<const CarveView *> &views, const CarveOptions &options, Voxels *voxels);
 
-// Gives every surface voxel the median colour of the views that see it, inner ones that of the nearest surface below or
-// beside; grey when there is none. Returns how many occupied voxels no view sees.
-std::size_t colour_voxels(const std::vector<CarveView> &views, VoxelGrid *grid);
+// Eq 6.11 as printed: every occupied voxel, no visibility. Returns how many became unknown.
+std::size_t carve_by_colour_thesis(const std::vector<const CarveView *> &views, const CarveOptions &options,
+                                   Voxels *voxels);
+
+// Colours of the surface: median of the views that see it; elsewhere that of the nearest coloured voxel. Leaves
+// voxels->colours empty when no view has colour.
+void colour_voxels(const std::vector<const CarveView *> &views, Voxels *voxels);
 
 } // namespace outcrop

@@ -1,111 +1,100 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A depth buffer and squares; shaded by the surface's own direction so that a grey body still has a form.
+// Splats.
 #include "site/render_voxels.h"
 
-#include <algorithm>
-#include <cmath>
+#include <array>
 #include <limits>
+#include <stdexcept>
+
+#include "site/carve_surface.h"
 
 namespace outcrop {
-namespace {
 
-// Light from above and a little from the side, and what is left of a colour in the shade.
-const Eigen::Vector3f kLight = Eigen::Vector3f(-0.35f, -0.5f, 0.8f).normalized();
-constexpr float kAmbient = 0.72f;
-
-// From where there is something to where there is nothing, over the 26 neighbours.
-Eigen::Vector3f outward(const VoxelGrid &grid, int i, int j, int k)
-{
-    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-    for (int dk = -1; dk <= 1; dk++)
-        for (int dj = -1; dj <= 1; dj++)
-            for (int di = -1; di <= 1; di++)
-                if (!grid.is_occupied(i + di, j + dj, k + dk)) sum += Eigen::Vector3i(di, dj, dk).cast<float>();
-    const float length = sum.norm();
-    return length > 0 ? Eigen::Vector3f(sum / length) : Eigen::Vector3f(0, 0, 1);
-}
-
-cv::Vec3b shaded(const cv::Vec3b &colour, const Eigen::Vector3f &normal)
-{
-    const float light = kAmbient + (1 - kAmbient) * std::max(0.0f, normal.dot(kLight));
-    return cv::Vec3b(cv::Vec3f(colour) * light);
-}
-
-} // namespace
-
-VoxelCloud::VoxelCloud(const std::vector<Shape> &shapes)
-{
-    for (const Shape &shape : shapes) {
-        const VoxelGrid &grid = shape.grid;
-        Body body{shape.index, static_cast<float>(grid.size_m), {}};
-        for (int k = 0; k < grid.nz; k++) {
-            for (int j = 0; j < grid.ny; j++) {
-                for (int i = 0; i < grid.nx; i++) {
-                    if (!grid.is_surface(i, j, k)) continue;
-                    const cv::Vec3b colour =
-                        grid.colour.empty() ? cv::Vec3b(170, 170, 170) : grid.colour[grid.index(i, j, k)];
-                    body.splats.push_back({grid.centre(i, j, k).cast<float>(), shaded(colour, outward(grid, i, j, k))});
-                }
-            }
-        }
-        if (!body.splats.empty()) bodies_.push_back(std::move(body));
+class VoxelDrawing {
+public:
+    VoxelDrawing(const oc_camera_t &camera, double near_m) : camera_(camera), near_m_(near_m)
+    {
+        const int width = static_cast<int>(camera.k.width_px), height = static_cast<int>(camera.k.height_px);
+        image_.rgb = cv::Mat3b(height, width, cv::Vec3b(0, 0, 0));
+        image_.depth = cv::Mat1f(height, width, std::numeric_limits<float>::infinity());
+        image_.mask = cv::Mat1b(height, width, static_cast<uchar>(0));
+        oc_pose_centre(&camera.pose, eye_);
     }
-}
 
-bool VoxelCloud::has(int index) const
-{
-    return std::any_of(bodies_.begin(), bodies_.end(), [index](const Body &body) { return body.index == index; });
-}
+    VoxelImage draw(const VoxelCloud &cloud)
+    {
+        for (const VoxelCloud::Part &part : cloud.parts_) draw_part(cloud, part);
+        return std::move(image_);
+    }
 
-void VoxelCloud::draw(const oc_camera_t &camera, double near_m, Frame *frame) const
-{
-    double P[12];
-    oc_camera_matrix(&camera, P);
-    float p[12];
-    std::copy(std::begin(P), std::end(P), std::begin(p));
-    const auto fx = static_cast<float>(camera.k.fx_px), fy = static_cast<float>(camera.k.fy_px);
-    const auto nearest = static_cast<float>(near_m);
-    cv::Mat1f depth(frame->rgb.size(), std::numeric_limits<float>::infinity());
-    for (const Body &body : bodies_) {
-        // A cube seen across its diagonal is wider than its side.
-        const float half_u = 0.62f * body.size_m * fx, half_v = 0.62f * body.size_m * fy;
-        const auto index = static_cast<unsigned char>(std::clamp(body.index, 1, 253));
-        for (const Splat &splat : body.splats) {
-            const Eigen::Vector3f &a = splat.at;
-            const float w = p[8] * a.x() + p[9] * a.y() + p[10] * a.z() + p[11];
-            if (!(w > nearest)) continue;
-            const float u = (p[0] * a.x() + p[1] * a.y() + p[2] * a.z() + p[3]) / w;
-            const float v = (p[4] * a.x() + p[5] * a.y() + p[6] * a.z() + p[7]) / w;
-            const float du = std::max(0.5f, half_u / w), dv = std::max(0.5f, half_v / w);
-            if (!(u + du > 0 && v + dv > 0 && u - du < static_cast<float>(depth.cols) &&
-                  v - dv < static_cast<float>(depth.rows)))
-                continue;
-            const int x0 = std::max(0, static_cast<int>(std::ceil(u - du)));
-            const int x1 = std::min(depth.cols - 1, static_cast<int>(std::floor(u + du)));
-            const int y0 = std::max(0, static_cast<int>(std::ceil(v - dv)));
-            const int y1 = std::min(depth.rows - 1, static_cast<int>(std::floor(v + dv)));
-            for (int y = y0; y <= y1; y++) {
-                for (int x = x0; x <= x1; x++) {
-                    if (depth(y, x) <= w) continue;
-                    depth(y, x) = w;
-                    frame->rgb(y, x) = splat.colour;
-                    frame->mask(y, x) = index;
-                }
+private:
+    void draw_part(const VoxelCloud &cloud, const VoxelCloud::Part &part)
+    {
+        const GridCamera camera(camera_, part.grid);
+        const Eigen::Vector3d eye =
+            (Eigen::Vector3d(eye_[0], eye_[1], eye_[2]) - part.grid.centre(0, 0, 0)) / part.grid.cell_m;
+        for (std::size_t n = part.first; n < part.last; ++n) {
+            const VoxelCloud::Splat &splat = cloud.splats_[n];
+            if (!(splat.open & towards(splat.centre, eye.cast<float>()))) continue;
+            const VoxelPixel at = camera.project(static_cast<int>(splat.centre.x()), static_cast<int>(splat.centre.y()),
+                                                 static_cast<int>(splat.centre.z()));
+            paint(splat_of(camera, at, near_m_), static_cast<float>(at.depth_m), splat.colour, part.index);
+        }
+    }
+
+    // Faces of a cell that look towards the eye.
+    static int towards(const Eigen::Vector3f &cell, const Eigen::Vector3f &eye)
+    {
+        int faces = 0;
+        for (int axis = 0; axis < 3; ++axis) {
+            if (eye[axis] < cell[axis] - 0.5F) faces |= 1 << (2 * axis);
+            if (eye[axis] > cell[axis] + 0.5F) faces |= 2 << (2 * axis);
+        }
+        return faces;
+    }
+
+    void paint(const cv::Rect &splat, float depth, const cv::Vec3b &colour, int index)
+    {
+        for (int y = splat.y; y < splat.y + splat.height; ++y) {
+            float *depths = image_.depth[y];
+            for (int x = splat.x; x < splat.x + splat.width; ++x) {
+                if (!(depth < depths[x])) continue;
+                depths[x] = depth;
+                image_.rgb(y, x) = colour;
+                image_.mask(y, x) = static_cast<uchar>(index);
             }
         }
     }
+
+    oc_camera_t camera_;
+    double near_m_;
+    double eye_[3];
+    VoxelImage image_;
+};
+
+void VoxelCloud::add(int index, const Voxels &voxels)
+{
+    if (index < 1 || index > 254) throw std::invalid_argument("voxel cloud: index not in 1..254");
+    Part part{index, voxels.grid, splats_.size(), 0};
+    for (const SurfaceVoxel &v : surface_of(voxels)) {
+        static constexpr int kSteps[6][3] = {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}};
+        int open = 0;
+        for (int face = 0; face < 6; ++face)
+            if (!voxels.is_occupied(v.i + kSteps[face][0], v.j + kSteps[face][1], v.k + kSteps[face][2]))
+                open |= 1 << face;
+        splats_.push_back({Eigen::Vector3i(v.i, v.j, v.k).cast<float>(),
+                           voxels.colours.empty() ? cv::Vec3b(200, 200, 200) : voxels.colours[v.at],
+                           static_cast<std::uint8_t>(open)});
+    }
+    part.last = splats_.size();
+    parts_.push_back(part);
 }
 
-Frame render_voxels(const SiteModel &model, const VoxelCloud &voxels, const GroundTexture &ground,
-                    const oc_camera_t &camera, const RenderOptions &options)
+VoxelImage render_voxels(const VoxelCloud &cloud, const oc_camera_t &camera, double near_m)
 {
-    SiteModel rest;
-    for (const Obstacle &obstacle : model.obstacles)
-        if (!voxels.has(obstacle.index)) rest.obstacles.push_back(obstacle);
-    rest.suspected = model.suspected;
-    Frame frame = render_boxes(rest, ground, camera, options);
-    voxels.draw(camera, options.near_m, &frame);
-    return frame;
+    if (!oc_intrinsics_is_valid(&camera.k) || !oc_pose_is_valid(&camera.pose))
+        throw std::invalid_argument("render voxels: invalid camera");
+    return VoxelDrawing(camera, near_m).draw(cloud);
 }
 
 } // namespace outcrop
