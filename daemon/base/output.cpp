@@ -2,7 +2,6 @@
 // Order of writing: model first, report last, so a reader that sees the report sees a finished run.
 #include "output.h"
 
-#include <cctype>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -10,12 +9,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "site/carve.h"
 #include "site/export.h"
-#include "site/export_shape.h"
 #include "site/ground_map.h"
 #include "site/path.h"
 #include "site/sequence.h"
+#include "site/shapes.h"
 
 namespace outcrop {
 namespace {
@@ -83,59 +81,12 @@ void write_report(const std::string &path, const json &report)
     std::filesystem::rename(part, path);
 }
 
-// Carves every obstacle that has silhouettes; its box becomes that of points and volume together. A grid that is too
-// large is told and its obstacle stays a box.
-std::vector<Shape> carve_shapes(Session &session, const OutputOptions &options, const Progress &progress,
-                                SiteModel *model)
-{
-    std::vector<Shape> shapes;
-    const auto views = session.carve_views();
-    CarveOptions carve_options;
-    carve_options.is_thesis = options.method == "thesis";
-    double n_silhouettes = 0, n_voxels = 0;
-    for (std::size_t i = 0; i < views.size(); i++) {
-        Obstacle &box = model->obstacles[i];
-        n_silhouettes += static_cast<double>(views[i].size());
-        if (views[i].empty()) continue;
-        try {
-            Carved carved = carve(box, views[i], carve_options);
-            if (carved.is_empty()) continue;
-            box = final_box(box, carved);
-            box.voxel_m = carved.grid.size_m;
-            n_voxels += static_cast<double>(carved.grid.size());
-            Mesh mesh = mesh_of(carved.grid);
-            shapes.push_back({box.index, std::move(carved.grid), std::move(mesh)});
-        } catch (const std::runtime_error &fault) {
-            progress("obstacle " + std::to_string(box.index) + ": " + fault.what());
-        }
-    }
-    model->counts["silhouettes"] = n_silhouettes;
-    model->counts["voxels"] = n_voxels;
-    return shapes;
-}
-
 // For the ground map: what the points said stays doubtful ground where the volume says otherwise.
 SiteModel with_points_boxes(SiteModel finished, const SiteModel &model)
 {
     for (std::size_t i = 0; i < finished.obstacles.size(); i++)
         if (finished.obstacles[i].voxel_m > 0) finished.suspected.push_back(model.obstacles[i]);
     return finished;
-}
-
-// Shapes of an earlier run in that folder go first.
-void write_shapes(const std::string &dir, const SiteModel &model, const std::vector<Shape> &shapes,
-                  const OverheadMap &overhead)
-{
-    for (const auto &entry : std::filesystem::directory_iterator(dir)) {
-        const std::string name = entry.path().filename().string();
-        if (!name.empty() && std::isdigit(static_cast<unsigned char>(name[0])) && entry.path().extension() == ".ply")
-            std::filesystem::remove(entry.path());
-    }
-    for (const Shape &shape : shapes) {
-        write_voxels_ply(dir + "/" + std::to_string(shape.index) + ".voxels.ply", shape.grid);
-        write_mesh_ply(dir + "/" + std::to_string(shape.index) + ".ply", shape.mesh);
-    }
-    write_gltf(dir + "/site.glb", model, shapes, overhead);
 }
 
 } // namespace
@@ -172,7 +123,9 @@ void write_output(Session &session, const Ledger &ledger, const ReceiveCounts &r
 
     Stopwatch carve_watch;
     SiteModel finished = model;
-    const std::vector<Shape> shapes = carve_shapes(session, options, progress, &finished);
+    CarveOptions carve;
+    if (options.method == "thesis") carve.method = CarveMethod::kThesis;
+    const std::vector<Shape> shapes = carve_shapes(session.carve_views(), session.options().shapes.grow_share, carve, progress, &finished);
     ms["carve"] = carve_watch.ms();
 
     Stopwatch map_watch;

@@ -66,6 +66,7 @@ public:
 
     const std::map<int, View> &views();
     const SiteModel &model() const { return model_; }
+    const SessionOptions &options() const { return options_; }
     const std::map<TileKey, TileBlob> &tiles() const;
     const PacketAssembler &assembler() const { return assembler_; }
     std::optional<Area> area() const;

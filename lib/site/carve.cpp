@@ -244,6 +244,7 @@ Carved carve_obstacle(const Obstacle &box, const std::vector<CarveView> &views, 
     if (options.method == CarveMethod::kThesis) {
         if (options.with_colour) carved.n_colour_removed = carve_by_colour_thesis(in_order, options, &carved.voxels);
     } else {
+        fill_down(&carved.voxels);
         if (options.with_colour) carved.n_colour_removed = carve_by_colour(in_order, options, &carved.voxels);
         close_voxels(options.close_cells, &carved.voxels);
         open_voxels(options.open_cells, &carved.voxels);

@@ -66,6 +66,21 @@ void for_neighbours(const VoxelGrid &grid, std::size_t at, const Visit &visit)
 
 } // namespace
 
+void fill_down(Voxels *voxels)
+{
+    const VoxelGrid &grid = voxels->grid;
+    for (int j = 0; j < grid.ny; ++j) {
+        for (int i = 0; i < grid.nx; ++i) {
+            bool is_under = false;
+            for (int k = grid.nz - 1; k >= 0; --k) {
+                VoxelState &state = voxels->states[grid.at(i, j, k)];
+                if (state == VoxelState::kOccupied) is_under = true;
+                if (state == VoxelState::kUnknown && is_under) state = VoxelState::kOccupied;
+            }
+        }
+    }
+}
+
 void close_voxels(int cells, Voxels *voxels)
 {
     if (cells <= 0) return;

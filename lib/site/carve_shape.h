@@ -6,6 +6,10 @@
 
 namespace outcrop {
 
+// What is unknown below something occupied becomes occupied: obstacles stand on the ground. Where an obstacle's own foot
+// hides the ground from every view nothing else can be told.
+void fill_down(Voxels *voxels);
+
 // Closing by a cube of 2 cells + 1: unknown voxels in gaps between occupied ones become occupied; free ones stay free.
 void close_voxels(int cells, Voxels *voxels);
 

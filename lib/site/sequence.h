@@ -6,9 +6,9 @@
 #include <string>
 
 #include "site/overhead.h"
-#include "site/export_shape.h"
 #include "site/path.h"
 #include "site/render.h"
+#include "site/shapes.h"
 #include "site/site_model.h"
 
 namespace outcrop {

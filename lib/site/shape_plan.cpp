@@ -280,6 +280,29 @@ void paint_cells(const oc_silhouette_t &s, const std::vector<std::uint8_t> &cell
     }
 }
 
+// 255 inside the projection of the box that was asked about. The labels beside it mean nothing; whatever is there is not
+// of this obstacle, which for its volume is the same as ground.
+cv::Mat1b projection_of(const oc_ground_box_t &asked, double grow, const oc_camera_t &camera, const cv::Size &size)
+{
+    Obstacle box;
+    box.obb_centre = Vector3d(asked.x_m, asked.y_m, asked.height_m / 2);
+    box.obb_size = Vector3d(asked.length_m, asked.width_m, asked.height_m);
+    box.aabb_max.z() = asked.height_m;
+    box.yaw_rad = asked.yaw_rad;
+    cv::Mat1b inside = cv::Mat1b::zeros(size);
+    constexpr int kShift = 4;
+    std::vector<cv::Point> points, hull;
+    for (const Vector3d &corner : corners(box, grow)) {
+        double x, y;
+        if (!(oc_camera_project(&camera, corner.data(), &x, &y) > 1e-3)) return inside;
+        const auto fixed = [](double v) { return static_cast<int>(std::lround(std::clamp(v, -8e3, 8e3) * 16)); };
+        points.emplace_back(fixed(x), fixed(y));
+    }
+    cv::convexHull(points, hull);
+    cv::fillConvexPoly(inside, hull, cv::Scalar(255), cv::LINE_8, kShift);
+    return inside;
+}
+
 } // namespace
 
 void ShapeOptions::check() const
@@ -325,7 +348,10 @@ std::vector<CarveView> gather_silhouettes(const SiteModel &model, const std::map
                 if (view.labels.empty())
                     view.labels = cv::Mat1b(static_cast<int>(view.camera.k.height_px),
                                             static_cast<int>(view.camera.k.width_px), std::uint8_t{OC_LABEL_UNKNOWN});
+                const double grow = plan.request.grow_percent * 0.01;
                 paint_cells(head, cells, &view.labels);
+                view.labels.setTo(OC_LABEL_GROUND,
+                                  projection_of(plan.request.boxes[box], grow, view.camera, view.labels.size()) == 0);
             }
         }
         if (!view.labels.empty()) out.push_back(std::move(view));
