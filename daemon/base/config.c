@@ -19,7 +19,7 @@ typedef struct yaml_file {
     int *as, *method; /* places in as_words, method_words */
     double *area;
     uint32_t n_area;
-    yaml_bool_t *textures, *exit_when_settled;
+    yaml_bool_t *textures, *resume, *exit_when_settled;
 } yaml_file_t;
 
 #define OPTIONAL (CYAML_FLAG_OPTIONAL | CYAML_FLAG_POINTER)
@@ -46,6 +46,7 @@ static const cyaml_schema_field_t fields[] = {
     CYAML_FIELD_STRING_PTR("path", OPTIONAL, yaml_file_t, path, 1, LONGEST),
     WORD_FIELD("method", method, method_words),
     CYAML_FIELD_SEQUENCE_COUNT("area", OPTIONAL, yaml_file_t, area, n_area, &number_schema, 5, 5),
+    WORD_FIELD("resume", resume, bool_words),
     WORD_FIELD("exit_when_settled", exit_when_settled, bool_words),
     CYAML_FIELD_END};
 
@@ -89,8 +90,7 @@ static const oc_yaml_key_t keys[] = {
     {.path = "out",
      .form = "folder",
      .example = "out",
-     .meaning = "Folder of the run, from the working directory when it is not absolute; an older link.lcm in it is "
-                "overwritten."},
+     .meaning = "Folder of the run, from the working directory when it is not absolute; its link.lcm is the journal."},
     {.path = "as",
      .fallback = "boxes",
      .meaning = "How obstacles are shown, and so what is asked for: voxels need silhouettes and textures; none: no "
@@ -112,6 +112,10 @@ static const oc_yaml_key_t keys[] = {
      .example = "[-3.5, 3.5, -3.5, 3.5, 1.504]",
      .without = "what the vehicle says, else the ground that two views share",
      .meaning = "Working area [x_min, x_max, y_min, y_max, z_max], ascending, z_max above 0."},
+    {.path = "resume",
+     .fallback = "true",
+     .meaning =
+         "Go on from the journal in the folder, if there is one; false: begin anew, the old one is overwritten."},
     {.path = "exit_when_settled",
      .fallback = "false",
      .meaning = "End when everything has come and is written, instead of at a signal."},
@@ -148,6 +152,7 @@ static void take_file(const yaml_file_t *file, oc_base_config_t *config)
     config->has_area = file->area != NULL;
     for (int i = 0; i < 5 && file->area; i++) config->area[i] = file->area[i];
     config->with_textures = !file->textures || *file->textures == YAML_TRUE;
+    config->resume = !file->resume || *file->resume == YAML_TRUE;
     config->exit_when_settled = file->exit_when_settled && *file->exit_when_settled == YAML_TRUE;
 }
 

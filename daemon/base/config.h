@@ -31,6 +31,7 @@ typedef struct oc_base_config {
     char method[16];               /* "best" or "thesis" */
     bool has_area;
     double area[5]; /* x_min, x_max, y_min, y_max, z_max; metres */
+    bool resume;    /* go on from out/link.lcm */
     bool exit_when_settled;
 } oc_base_config_t;
 

@@ -56,7 +56,9 @@ public:
 
 private:
     static void on_packet(void *user, const std::uint8_t *packet, std::size_t n_bytes);
+    void open_journal(const std::string &path);
     void receive(const std::uint8_t *packet, std::size_t n_bytes);
+    void take(const std::uint8_t *packet, std::size_t n_bytes);
     void send(const std::uint8_t *packet, std::size_t n_bytes);
     void record(const char *channel, const std::uint8_t *packet, std::size_t n_bytes);
     void tell_news();
@@ -101,7 +103,30 @@ Live::Live(const oc_base_config_t &config) : config_(config)
     // Last, so that a start that failed leaves nothing behind.
     std::filesystem::create_directories(output_.dir);
     std::filesystem::remove(output_.dir + "/report.json"); // the sign of a finished run
-    log_ = std::make_unique<LogWriter>(output_.dir + "/link.lcm");
+    open_journal(output_.dir + "/link.lcm");
+}
+
+// What an earlier base wrote down before it ended is taken in as if it came now.
+void Live::open_journal(const std::string &path)
+{
+    std::error_code none;
+    if (!config_.resume || !std::filesystem::exists(path) || std::filesystem::file_size(path, none) == 0) {
+        log_ = std::make_unique<LogWriter>(path);
+        return;
+    }
+    const LogFaults read = read_log(path, [this](const LogEvent &event) {
+        if (event.channel != OC_CHANNEL_DOWN && event.channel != OC_CHANNEL_UP) return;
+        ledger_.add(event.channel, event.payload.data(), event.payload.size());
+        if (event.channel != OC_CHANNEL_DOWN) return;
+        std::size_t n_bytes = 0;
+        const std::uint8_t *packet = oc_link_unwrap(event.payload.data(), event.payload.size(), &n_bytes);
+        if (packet) take(packet, n_bytes);
+    });
+    counts_.garbage_bytes = read.garbage_bytes;
+    session_->resume();
+    log_ = std::make_unique<LogWriter>(path, read);
+    say("went on from " + path + ": " + std::to_string(read.n_events) + " messages" +
+        (read.is_cut ? ", the last one was cut" : ""));
 }
 
 void Live::record(const char *channel, const std::uint8_t *packet, std::size_t n_bytes)
@@ -120,6 +145,11 @@ void Live::on_packet(void *user, const std::uint8_t *packet, std::size_t n_bytes
 void Live::receive(const std::uint8_t *packet, std::size_t n_bytes)
 {
     record(OC_CHANNEL_DOWN, packet, n_bytes);
+    take(packet, n_bytes);
+}
+
+void Live::take(const std::uint8_t *packet, std::size_t n_bytes)
+{
     const FeedResult result = session_->receive(packet, n_bytes, now_s());
     if (result == FeedResult::kIllFormed) counts_.ill_formed++;
     if (result == FeedResult::kForeign) counts_.foreign++;

@@ -125,7 +125,8 @@ void write_output(Session &session, const Ledger &ledger, const ReceiveCounts &r
     SiteModel finished = model;
     CarveOptions carve;
     if (options.method == "thesis") carve.method = CarveMethod::kThesis;
-    const std::vector<Shape> shapes = carve_shapes(session.carve_views(), session.options().shapes.grow_share, carve, progress, &finished);
+    const std::vector<Shape> shapes =
+        carve_shapes(session.carve_views(), session.options().shapes.grow_share, carve, progress, &finished);
     ms["carve"] = carve_watch.ms();
 
     Stopwatch map_watch;

@@ -73,6 +73,7 @@ FeedResult Session::receive(const std::uint8_t *packet, std::size_t n_bytes, dou
 
     if (head.type == OC_PACKET_IMAGE) return take_image(packet, n_bytes, now_s);
     const FeedResult result = assembler_.feed(packet, n_bytes);
+    if (head.type == OC_PACKET_RELABEL) note_relabel(packet, n_bytes);
     if (result != FeedResult::kTaken) return result;
     if (head.type == OC_PACKET_STATUS) {
         note_status(now_s);
@@ -183,15 +184,45 @@ bool Session::ask_missing_parts(double now_s)
         Asked &asked = asked_parts_[view];
         if (asked.tries > options_.max_tries) continue;
         is_waiting = true;
-        if (!may_ask(&asked, now_s)) continue;
-        const oc_resend_request_t request{static_cast<std::uint16_t>(view), parts};
-        const oc_packet_head_t head = next_head();
-        std::uint8_t buf[OC_MAX_DATAGRAM_BYTES];
-        std::size_t n_bytes = 0;
-        if (oc_packet_encode_resend(&head, &request, buf, options_.datagram_bytes, &n_bytes) == OC_OK)
-            send_(buf, n_bytes);
+        if (may_ask(&asked, now_s)) send_resend(view, parts);
     }
     return is_waiting;
+}
+
+void Session::send_resend(int view, std::uint32_t parts)
+{
+    const oc_resend_request_t request{static_cast<std::uint16_t>(view), parts};
+    const oc_packet_head_t head = next_head();
+    std::uint8_t buf[OC_MAX_DATAGRAM_BYTES];
+    std::size_t n_bytes = 0;
+    if (oc_packet_encode_resend(&head, &request, buf, options_.datagram_bytes, &n_bytes) == OC_OK) send_(buf, n_bytes);
+}
+
+void Session::resume()
+{
+    if (rival_) return;
+    for (const auto &[id, view] : assembler_.views())
+        if (!view.junctions.empty()) asked_labels_[id];
+}
+
+bool Session::ask_labels(double now_s)
+{
+    bool is_waiting = false;
+    for (auto &[view, asked] : asked_labels_) {
+        if (asked.tries > options_.max_tries) continue;
+        is_waiting = true;
+        if (may_ask(&asked, now_s)) send_resend(view, 0);
+    }
+    return is_waiting;
+}
+
+// The labels that were asked for have come, in one packet or, for very many junctions, the first of some.
+void Session::note_relabel(const std::uint8_t *packet, std::size_t n_bytes)
+{
+    const auto relabel = std::make_unique<oc_relabel_t>();
+    if (oc_packet_decode_relabel(packet, n_bytes, relabel.get()) != OC_OK) return;
+    const auto asked = asked_labels_.find(relabel->view);
+    if (asked != asked_labels_.end() && asked->second.tries > 0) asked_labels_.erase(asked);
 }
 
 // Blocks that a set of views calls for, whatever of them is known already.
@@ -384,6 +415,7 @@ void Session::step(double now_s)
 
     if (phase_ == Phase::kGather) {
         bool is_waiting = ask_missing_parts(now_s);
+        is_waiting = ask_labels(now_s) || is_waiting;
         if (!rival_) is_waiting = ask_blocks(is_waiting, now_s) || is_waiting;
         if (is_waiting || !is_source_done(now_s)) return;
         settle();

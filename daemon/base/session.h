@@ -50,6 +50,9 @@ public:
     // One packet of the downlink. Returns what became of it.
     FeedResult receive(const std::uint8_t *packet, std::size_t n_bytes, double now_s);
 
+    // What was received so far comes from a journal: labels that changed while nobody listened are asked for.
+    void resume();
+
     // Do what is due: resend, patch and overhead requests, solving. Call it every 50 ms or so.
     void step(double now_s);
 
@@ -81,9 +84,12 @@ private:
     void on_evidence(double now_s);
     FeedResult take_image(const std::uint8_t *packet, std::size_t n_bytes, double now_s);
     void note_status(double now_s);
+    void note_relabel(const std::uint8_t *packet, std::size_t n_bytes);
     void note_view(const std::uint8_t *packet, std::size_t n_bytes);
     std::map<int, std::uint32_t> missing();
     bool ask_missing_parts(double now_s);
+    bool ask_labels(double now_s);
+    void send_resend(int view, std::uint32_t parts);
     bool ask_blocks(bool is_waiting_for_parts, double now_s);
     bool ask_tiles(double now_s);
     std::vector<WantedBlocks> blocks_for(std::vector<View> list) const;
@@ -111,6 +117,7 @@ private:
 
     std::set<int> heard_;                             // views of which a part came
     std::map<int, std::vector<std::uint8_t>> wanted_; // per view one byte per block, 1: wanted
+    std::map<int, Asked> asked_labels_;               // views whose labels may be old
     std::map<int, Asked> asked_blocks_, asked_parts_, asked_tiles_;
     std::vector<TileRequest> tile_plan_;
     std::uint64_t n_given_up_ = 0;

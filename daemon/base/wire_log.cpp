@@ -110,6 +110,7 @@ LogFaults read_log(const std::string &path, const std::function<void(const LogEv
             take(event_at(bytes, at));
             n_events++;
             at += event_bytes;
+            faults.whole_bytes = at;
             continue;
         }
         const bool is_event = is_sync(bytes, at);
@@ -120,11 +121,19 @@ LogFaults read_log(const std::string &path, const std::function<void(const LogEv
         at = next;
     }
     if (n_events == 0) throw std::runtime_error(path + ": holds no LCM event");
+    faults.n_events = n_events;
     return faults;
 }
 
 LogWriter::LogWriter(const std::string &path) : file_(std::fopen(path.c_str(), "wb")), path_(path)
 {
+    if (!file_) throw std::runtime_error(path + ": " + std::strerror(errno));
+}
+
+LogWriter::LogWriter(const std::string &path, const LogFaults &read) : path_(path), next_event_(read.n_events)
+{
+    std::filesystem::resize_file(path, read.whole_bytes);
+    file_.reset(std::fopen(path.c_str(), "ab"));
     if (!file_) throw std::runtime_error(path + ": " + std::strerror(errno));
 }
 

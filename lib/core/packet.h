@@ -242,7 +242,7 @@ typedef struct oc_announce {
     int64_t utime_us;
 } oc_announce_t;
 
-/* Ask for parts of a view again; bit i of parts = part i; all ones = everything. */
+/* Ask for parts of a view again; bit i of parts = part i; all ones = everything; 0 = its labels as they stand. */
 typedef struct oc_resend_request {
     uint16_t view;
     uint32_t parts;

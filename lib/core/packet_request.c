@@ -11,7 +11,6 @@ oc_status_t oc_packet_encode_resend(const oc_packet_head_t *packet, const oc_res
                                     size_t cap, size_t *n_bytes)
 {
     OC_ASSERT(packet && request && buf && n_bytes);
-    if (request->parts == 0) return OC_E_ARG;
 
     oc_bit_writer_t writer;
     oc_packet_begin(&writer, packet, OC_PACKET_RESEND_REQUEST, buf, cap);
@@ -29,7 +28,7 @@ oc_status_t oc_packet_decode_resend(const uint8_t *buf, size_t n_bytes, oc_resen
 
     oc_resend_request_t result = {.view = (uint16_t)oc_bits_get(&reader, 16)};
     result.parts = oc_bits_get(&reader, 32);
-    if (oc_packet_close(&reader) != OC_OK || result.parts == 0) return OC_E_FORMAT;
+    if (oc_packet_close(&reader) != OC_OK) return OC_E_FORMAT;
     *request = result;
     return OC_OK;
 }

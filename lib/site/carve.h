@@ -47,7 +47,7 @@ struct CarveOptions {
     int min_views_to_judge = 4; // views; with fewer nobody is left out
     // Colour: the voxel's colours in the views that see it must agree.
     bool with_colour = true;
-    double max_difference = 40; // grey levels, beyond the spread in the three by three pixels round it
+    double max_difference = 25; // grey levels, beyond the spread in the three by three pixels round it
     int min_colour_views = 3;   // that must see a voxel before its colours can remove it
     double min_agreeing = 0.5;  // share of these views that must agree
     int max_sweeps = 24;        // each peels one layer

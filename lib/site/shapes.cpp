@@ -13,8 +13,8 @@
 namespace outcrop {
 
 std::vector<Shape> carve_shapes(const std::vector<std::vector<CarveView>> &views, double asked_grow_share,
-                                const CarveOptions &options,
-                                const std::function<void(const std::string &)> &tell, SiteModel *model)
+                                const CarveOptions &options, const std::function<void(const std::string &)> &tell,
+                                SiteModel *model)
 {
     std::vector<Shape> shapes;
     double n_silhouettes = 0, n_voxels = 0, n_by_colour = 0;

@@ -24,8 +24,8 @@ struct Shape {
 // final one of points and volume, with voxel_m. An obstacle whose grid would be too large stays a box, and `tell` gets
 // one line about it. asked_grow_share: as in ShapeOptions. Adds to the model's counts.
 std::vector<Shape> carve_shapes(const std::vector<std::vector<CarveView>> &views, double asked_grow_share,
-                                const CarveOptions &options,
-                                const std::function<void(const std::string &)> &tell, SiteModel *model);
+                                const CarveOptions &options, const std::function<void(const std::string &)> &tell,
+                                SiteModel *model);
 
 // dir/K.voxels.ply and dir/K.ply of every shape, and dir/site.glb: ground, boxes and surfaces. Shapes of an earlier run
 // in that folder are removed first. Throws std::runtime_error with one line that names the file.

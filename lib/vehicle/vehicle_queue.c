@@ -147,6 +147,7 @@ static oc_status_t handle_resend(oc_vehicle_t *vehicle, const oc_resend_request_
         set_free(vehicle, view);
         return OC_OK;
     }
+    if (request->parts == 0 && view->n_sent > 0) oc_vehicle_relabelled(view, 0, view->n_sent);
     /* The base cannot know how many parts there are: bits beyond the last mean nothing. */
     view->again_parts |= request->parts & all_parts(view) & ~view->unsent_parts;
     return OC_OK;

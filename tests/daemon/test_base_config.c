@@ -157,14 +157,14 @@ static void the_sample_loads_with_every_key(void)
         if (!is_held_back) freed[n++] = *c;
     }
     freed[n] = '\0';
-    TEST_ASSERT_EQUAL(8, n_freed);
+    TEST_ASSERT_EQUAL(9, n_freed);
     TEST_ASSERT_TRUE_MESSAGE(load(freed), told);
     TEST_ASSERT_EQUAL(1, config.vehicle);
     TEST_ASSERT_EQUAL(1380, config.datagram_bytes);
     TEST_ASSERT_EQUAL(8, config.patch_quality);
     TEST_ASSERT_EQUAL_STRING("boxes", config.represent);
     TEST_ASSERT_EQUAL_STRING("best", config.method);
-    TEST_ASSERT_TRUE(config.has_area && !config.exit_when_settled && config.with_textures);
+    TEST_ASSERT_TRUE(config.has_area && !config.exit_when_settled && config.with_textures && config.resume);
 }
 
 int main(void)

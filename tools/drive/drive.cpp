@@ -71,7 +71,7 @@ void write_configs(const DriveOptions &options, const std::string &path_file)
     std::string text = std::string("vehicle: 1\ndown_url: \"") + kDownUrl + "\"\nup_url: \"" + kUpUrl +
                        "\"\ndatagram_bytes: " + datagram + "\nout: " + yaml_text(options.out) +
                        "\nas: " + options.represent + "\ntextures: " + (options.with_textures ? "true" : "false") +
-                       "\nmethod: " + options.method + "\nexit_when_settled: true\n";
+                       "\nmethod: " + options.method + "\nresume: false\nexit_when_settled: true\n";
     if (!path_file.empty()) text += "path: " + yaml_text(path_file) + "\n";
     write_text(base / "outcrop-base.yaml", text);
 }
