@@ -156,6 +156,21 @@ TEST_F(FinalBoxTest, LeavesThePointsBoxAloneWithoutAVolumeThatFits)
     EXPECT_TRUE(is_untouched(final_box(box, points_within(0.8), carved, elsewhere)));
 }
 
+TEST_F(FinalBoxTest, OneViewAsideCostsOneToleratedMiss)
+{
+    const Obstacle box = scaled(0.8);
+    EXPECT_EQ(carve_with_box(box, points_within(0.9), views_, options_).tolerated_misses, 0);
+    cv::Mat1b &labels = views_[4].labels;
+    const cv::Mat1b whole = labels.clone();
+    labels.setTo(OC_LABEL_GROUND);
+    whole(cv::Rect(0, 0, whole.cols - 60, whole.rows)).copyTo(labels(cv::Rect(60, 0, whole.cols - 60, whole.rows)));
+    EXPECT_FALSE(carve_with_box(box, points_within(0.9), views_, options_, {}, 0).final.has_volume);
+    const CarvedBox result = carve_with_box(box, points_within(0.9), views_, options_);
+    EXPECT_EQ(result.tolerated_misses, 1);
+    EXPECT_TRUE(result.final.has_volume);
+    EXPECT_GE(iou(result.final.box), iou(box));
+}
+
 TEST_F(FinalBoxTest, RefusesOptionsOutOfRange)
 {
     FinalBoxOptions bad;

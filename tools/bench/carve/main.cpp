@@ -74,11 +74,10 @@ void measure_boxes(const Arguments &arguments, const eval::Truth &truth, const e
     for (const std::string &harm : arguments.harms) {
         std::vector<CarveView> views = bench::views_of(truth, obstacle.index, true, arguments.images);
         bench::harm(harm, &views);
-        const Carved carved = carve_obstacle(found->box, views, arguments.options);
-        const FinalBox final = final_box(found->box, found->points, carved, views);
-        std::printf("%-14s %-8s points %.3f final %.3f%s  hull %.3f\n", obstacle.name.c_str(), harm.c_str(),
+        const auto [carved, final, misses] = carve_with_box(found->box, found->points, views, arguments.options);
+        std::printf("%-14s %-8s points %.3f final %.3f%s  hull %.3f, misses %d\n", obstacle.name.c_str(), harm.c_str(),
                     box_iou(found->box, obstacle), box_iou(final.box, obstacle),
-                    final.has_volume ? "" : " (points alone)", bench::voxel_iou(carved.voxels, obstacle));
+                    final.has_volume ? "" : " (points alone)", bench::voxel_iou(carved.voxels, obstacle), misses);
         if (harm != "none") continue;
         parts->obstacles.push_back(final.box);
         parts->surfaces.push_back({obstacle.index, mesh_of(carved.voxels)});
