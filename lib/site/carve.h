@@ -47,9 +47,9 @@ struct CarveOptions {
     int min_views_to_judge = 4; // views; with fewer nobody is left out
     // Colour: the voxel's colours in the views that see it must agree.
     bool with_colour = true;
-    double max_difference = 25; // grey levels, beyond the spread in the three by three pixels round it
+    double max_difference = 25; // grey levels, beyond the spread of the four pixels round it
     int min_colour_views = 3;   // that must see a voxel before its colours can remove it
-    double min_agreeing = 0.5;  // share of these views that must agree
+    double min_agreeing = 0.7;  // share of these views that must agree
     int max_sweeps = 24;        // each peels one layer
     double max_removed = 0.35;  // of the hull's volume; a sweep that would pass it is the last
     // Thesis.

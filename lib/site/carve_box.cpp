@@ -404,4 +404,17 @@ FinalBox final_box(const Obstacle &from_points, const std::vector<SitePoint> &po
     return result;
 }
 
+CarvedBox carve_with_box(const Obstacle &from_points, const std::vector<SitePoint> &points,
+                         const std::vector<CarveView> &views, CarveOptions carve, const FinalBoxOptions &options,
+                         int max_more)
+{
+    CarvedBox result;
+    for (int more = 0;; ++more, ++carve.tolerated_misses) {
+        result.carved = carve_obstacle(from_points, views, carve);
+        result.final = final_box(from_points, points, result.carved, views, options);
+        result.tolerated_misses = carve.tolerated_misses;
+        if (result.final.has_volume || more >= max_more || result.carved.n_views == 0) return result;
+    }
+}
+
 } // namespace outcrop

@@ -37,4 +37,16 @@ struct FinalBox {
 FinalBox final_box(const Obstacle &from_points, const std::vector<SitePoint> &points, const Carved &carved,
                    const std::vector<CarveView> &views, const FinalBoxOptions &options = {});
 
+struct CarvedBox {
+    Carved carved;
+    FinalBox final;
+    int tolerated_misses = 0; // that the volume was carved with
+};
+
+// Both at once. A volume that does not fit the points may have lost them to one view that is aside: then it is carved
+// again with one more tolerated miss, and again, up to max_more. When none fits, the last volume and the points' box.
+CarvedBox carve_with_box(const Obstacle &from_points, const std::vector<SitePoint> &points,
+                         const std::vector<CarveView> &views, CarveOptions carve = {},
+                         const FinalBoxOptions &options = {}, int max_more = 1);
+
 } // namespace outcrop

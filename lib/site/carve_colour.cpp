@@ -16,11 +16,9 @@ namespace {
 
 using Colours = std::vector<cv::Vec3f>;
 
-// A view's colours: the lowest and highest in the three by three pixels round each, so that an edge seen half a pixel
-// aside is no disagreement.
 struct ColourView {
     GridCamera camera;
-    cv::Mat3b mean, low, high;
+    cv::Mat3b rgb;
     cv::Mat1b known;
     cv::Mat1f depth;
     cv::Vec3f gain{1, 1, 1};
@@ -31,25 +29,35 @@ std::vector<ColourView> prepare(const std::vector<const CarveView *> &views, con
     std::vector<ColourView> out;
     for (const CarveView *view : views) {
         if (view->rgb.empty()) continue;
-        ColourView v{GridCamera(view->camera, grid), view->rgb, {}, {}, {}, {}};
-        const cv::Mat box = cv::Mat::ones(3, 3, CV_8U);
-        cv::erode(view->rgb, v.low, box);
-        cv::dilate(view->rgb, v.high, box);
+        ColourView v{GridCamera(view->camera, grid), view->rgb, {}, {}};
         // A pixel beside an unknown one has no full neighbourhood.
-        cv::erode(view->known, v.known, box);
+        cv::erode(view->known, v.known, cv::Mat::ones(3, 3, CV_8U));
         out.push_back(v);
     }
     return out;
 }
 
+// Lowest and highest of the four pixels round the voxel's image, so that an edge seen half a pixel aside is no
+// disagreement, and the colour between them.
 struct Sample {
     cv::Vec3f low, high, mean;
     std::size_t view;
 };
 
-cv::Vec3f scaled(const cv::Vec3b &c, const cv::Vec3f &gain)
+Sample sample_at(const ColourView &view, double x_px, double y_px, std::size_t number)
 {
-    return cv::Vec3f(c).mul(gain);
+    const int x0 = static_cast<int>(std::floor(x_px)), y0 = static_cast<int>(std::floor(y_px));
+    const float fx = static_cast<float>(x_px - x0), fy = static_cast<float>(y_px - y0);
+    Sample s{cv::Vec3f::all(1e9F), cv::Vec3f::all(-1e9F), cv::Vec3f::all(0), number};
+    for (int dy = 0; dy < 2; ++dy)
+        for (int dx = 0; dx < 2; ++dx) {
+            const cv::Vec3f c(
+                view.rgb(std::clamp(y0 + dy, 0, view.rgb.rows - 1), std::clamp(x0 + dx, 0, view.rgb.cols - 1)));
+            s.mean += (dx ? fx : 1 - fx) * (dy ? fy : 1 - fy) * c;
+            for (int n = 0; n < 3; ++n) s.low[n] = std::min(s.low[n], c[n]), s.high[n] = std::max(s.high[n], c[n]);
+        }
+    s.low = s.low.mul(view.gain), s.high = s.high.mul(view.gain), s.mean = s.mean.mul(view.gain);
+    return s;
 }
 
 // What the views that see the voxel say. slack_m: so much behind the nearest splat is still seen.
@@ -64,8 +72,7 @@ void samples_of(const std::vector<ColourView> &views, const SurfaceVoxel &voxel,
         const cv::Point px(cvRound(at.x_px), cvRound(at.y_px));
         if (!view.camera.image().contains(px) || !view.known(px)) continue;
         if (at.depth_m > static_cast<double>(view.depth(px)) + slack_m) continue;
-        samples->push_back(
-            {scaled(view.low(px), view.gain), scaled(view.high(px), view.gain), scaled(view.mean(px), view.gain), v});
+        samples->push_back(sample_at(view, at.x_px, at.y_px, v));
     }
 }
 
@@ -181,7 +188,7 @@ std::size_t carve_by_colour_thesis(const std::vector<const CarveView *> &views, 
                     const VoxelPixel at = view.camera.project(i, j, k);
                     const cv::Point px(cvRound(at.x_px), cvRound(at.y_px));
                     if (at.depth_m > 0 && view.camera.image().contains(px) && view.known(px))
-                        colours.push_back(cv::Vec3i(view.mean(px)));
+                        colours.push_back(cv::Vec3i(view.rgb(px)));
                 }
                 int most = 0;
                 for (const cv::Vec3i &a : colours) {

@@ -23,8 +23,8 @@ bool is_inside(int bits, int corner)
     return (bits >> corner & 1) != 0;
 }
 
-// next[e]: the edge that follows e along a loop, or -1. Each cut of a face runs with the inside on its left, seen from
-// outside the cube, round each run of inside corners of the face.
+// next[e]: the edge that follows e along a loop, or -1. Each cut of a face runs from where the face's border enters a
+// run of inside corners to where it leaves it.
 std::array<int, 12> successors(int bits)
 {
     std::array<int, 12> next;
@@ -37,7 +37,7 @@ std::array<int, 12> successors(int bits)
             while (is_inside(bits, face[(last + 1) % 4])) last = (last + 1) % 4;
             const int enters = edge_between(face[(n + 3) % 4], face[n]);
             const int leaves = edge_between(face[last], face[(last + 1) % 4]);
-            next[static_cast<std::size_t>(leaves)] = enters;
+            next[static_cast<std::size_t>(enters)] = leaves;
         }
     return next;
 }

@@ -7,6 +7,7 @@
 #include "eval/image_quality.h"
 #include "eval/json_file.h"
 #include "eval/mesh.h"
+#include "eval/metrics_box.h"
 #include "eval/npz.h"
 #include "eval/ply.h"
 
@@ -340,6 +341,53 @@ TEST(Ply, NamesFileAndFault)
     EXPECT_THAT(fault("ply\nformat binary_big_endian 1.0\nend_header\n"), HasSubstr("cannot read \"format"));
     EXPECT_THAT(fault("plx\n"), HasSubstr("not a PLY file"));
     EXPECT_THAT(fault("ply\nformat ascii 1.0\n"), HasSubstr("header ends early"));
+}
+
+// An upright prism over a regular polygon; four corners and a stretch make a rectangle.
+TrueObstacle prism(int corners, double stretch, double yaw_rad)
+{
+    TrueObstacle t;
+    t.index = 1;
+    for (int n = 0; n < corners; ++n) {
+        const double a = 2 * M_PI * n / corners + M_PI / 4;
+        const Vector2d p(stretch * std::cos(a), std::sin(a));
+        for (const double z : {0.0, 1.0})
+            t.mesh.vertices.emplace_back(std::cos(yaw_rad) * p.x() - std::sin(yaw_rad) * p.y(),
+                                         std::sin(yaw_rad) * p.x() + std::cos(yaw_rad) * p.y(), z);
+    }
+    t.obb = min_area_box(t.mesh.vertices);
+    t.aabb.min_m = t.aabb.max_m = t.mesh.vertices.front();
+    for (const Vector3d &v : t.mesh.vertices)
+        t.aabb.min_m = t.aabb.min_m.cwiseMin(v), t.aabb.max_m = t.aabb.max_m.cwiseMax(v);
+    return t;
+}
+
+TEST(YawError, OnlyRectanglesHaveOneAndQuarterTurnsAreNone)
+{
+    EXPECT_TRUE(has_yaw(prism(4, 2, 0.3)));
+    EXPECT_FALSE(has_yaw(prism(3, 1, 0.3)));
+    EXPECT_FALSE(has_yaw(prism(40, 1, 0.3)));
+    for (const double yaw : {-1.3, -0.4, 0.0, 0.9, 1.5})
+        for (const double off_deg : {-44.0, -3.0, 0.0, 7.0, 40.0})
+            for (const int quarter : {-1, 0, 1}) {
+                Truth truth;
+                truth.obstacles = {prism(4, 1.5, yaw)};
+                eval::Run run;
+                FoundObstacle found;
+                found.index = 5;
+                found.aabb = truth.obstacles->front().aabb;
+                found.obb = truth.obstacles->front().obb;
+                found.obb.yaw_rad += off_deg * M_PI / 180 + quarter * M_PI / 2;
+                run.obstacles = {found};
+                const auto metrics = evaluate_boxes(truth, run);
+                ASSERT_TRUE(metrics && metrics->boxes[0].yaw_error_deg);
+                EXPECT_NEAR(*metrics->boxes[0].yaw_error_deg, std::abs(off_deg), 1e-6) << yaw << ' ' << off_deg;
+            }
+    Truth round;
+    round.obstacles = {prism(40, 1, 0)};
+    eval::Run run;
+    run.obstacles = {FoundObstacle{1, round.obstacles->front().aabb, round.obstacles->front().obb, std::nullopt}};
+    EXPECT_FALSE(evaluate_boxes(round, run)->boxes[0].yaw_error_deg);
 }
 
 } // namespace

@@ -78,6 +78,7 @@ void expect_perfect(const ordered_json &r)
     for (const auto &box : r["boxes"]) {
         EXPECT_NEAR(box["iou"], 1, 1e-9);
         EXPECT_NEAR(box["obb_iou"], 1, 1e-9);
+        EXPECT_LT(box["yaw_error_deg"].is_null() ? 0.0 : box["yaw_error_deg"].get<double>(), 1e-6);
         EXPECT_NEAR(box["centre_error_m"], 0, 1e-9);
         EXPECT_EQ(box["found"], box["truth"].get<int>() + kFoundOffset);
     }

@@ -19,7 +19,9 @@ What is judged (null, with a note on stderr, where the files for it are absent):
              within 2 px of an obstacle pixel that are labelled ground. Without that file: ground matches whose
              left apex is true ground and that are correct; no recall.
   boxes      given to obstacles one to one, best axis-aligned IoU first; obb_iou
-             against the least-area upright box of the true mesh.
+             against the least-area upright box of the true mesh; yaw_error_deg
+             (0..45, quarter turns are the same) where that box is the mesh's own
+             outline but for 10 % of its area.
   missed     obstacles without a box of IoU > 0.3.
   false      boxes of IoU <= 0.1 with every obstacle that are no fragment (half
              their volume inside an obstacle's box); duplicates are the rest of

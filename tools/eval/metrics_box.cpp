@@ -3,6 +3,7 @@
 #include "metrics_box.h"
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 
 namespace outcrop::eval {
@@ -34,7 +35,21 @@ bool is_part_of_truth(const FoundObstacle &box, const std::vector<TrueObstacle> 
     });
 }
 
+// A rectangle turned by a quarter is the same one.
+double yaw_error_deg(const YawBox &a, const YawBox &b)
+{
+    return std::abs(std::remainder(a.yaw_rad - b.yaw_rad, M_PI / 2)) * 180 / M_PI;
+}
+
 } // namespace
+
+bool has_yaw(const TrueObstacle &truth)
+{
+    std::vector<Eigen::Vector2d> outline;
+    for (const Eigen::Vector3d &v : truth.mesh.vertices) outline.emplace_back(v.x(), v.y());
+    if (outline.empty()) return false;
+    return area(convex_hull(outline)) >= (1 - kSquareSlack) * truth.obb.size_m.x() * truth.obb.size_m.y();
+}
 
 std::optional<BoxMetrics> evaluate_boxes(const Truth &truth, const Run &run)
 {
@@ -55,6 +70,7 @@ std::optional<BoxMetrics> evaluate_boxes(const Truth &truth, const Run &run)
         b.found = f.index;
         b.iou = c.iou;
         b.obb_iou = iou(t.obb, f.obb);
+        if (has_yaw(t)) b.yaw_error_deg = yaw_error_deg(t.obb, f.obb);
         b.centre_error_m = (t.aabb.centre_m() - f.aabb.centre_m()).norm();
         is_given[c.found] = true;
         is_good[c.found] = c.iou > kFalseIou;

@@ -21,6 +21,7 @@ struct BoxMetric {
     std::optional<int> found;             /* index of the box given to it; nothing: none touches it */
     double iou = 0;                       /* axis-aligned */
     double obb_iou = 0;                   /* yaw-oriented, against the least-area box of the mesh */
+    std::optional<double> yaw_error_deg;  /* 0..45; only where the true obstacle has straight, square sides */
     std::optional<double> centre_error_m; /* of the axis-aligned boxes' centres */
 };
 
@@ -37,6 +38,10 @@ struct BoxMetrics {
  * else false; one given to an obstacle at an IoU of at most kFalseIou is
  * judged the same way. */
 std::optional<BoxMetrics> evaluate_boxes(const Truth &truth, const Run &run);
+
+/* Is the obstacle's outline its least-area rectangle, but for kSquareSlack of the area? Only then has it a yaw. */
+constexpr double kSquareSlack = 0.1;
+bool has_yaw(const TrueObstacle &truth);
 
 /* Truth's obstacle that the found one of this index was given to. */
 const TrueObstacle *truth_of(int found_index, const BoxMetrics &boxes, const Truth &truth);

@@ -39,6 +39,7 @@ void put_boxes(const std::optional<BoxMetrics> &m, Out &out)
                                 {"found", b.found ? Out(*b.found) : Out(nullptr)},
                                 {"iou", b.iou},
                                 {"obb_iou", b.obb_iou},
+                                {"yaw_error_deg", maybe(b.yaw_error_deg)},
                                 {"centre_error_m", maybe(b.centre_error_m)}});
     out["missed"] = m->missed.size();
     out["missed_truths"] = m->missed;
@@ -128,10 +129,10 @@ std::string share_table(const Report &r)
 std::string box_table(const BoxMetrics &m)
 {
     Table t;
-    t.row({"obstacle", "box", "IoU", "yaw IoU", "centre off"});
+    t.row({"obstacle", "box", "IoU", "yaw IoU", "yaw off", "centre off"});
     for (const BoxMetric &b : m.boxes)
         t.row({std::to_string(b.truth) + " " + b.name, b.found ? std::to_string(*b.found) : "-", number(b.iou, 3),
-               number(b.obb_iou, 3), number(b.centre_error_m, 4, " m")});
+               number(b.obb_iou, 3), number(b.yaw_error_deg, 1, " deg"), number(b.centre_error_m, 4, " m")});
     std::ostringstream out;
     out << t.text() << "missed " << m.missed.size() << ", false " << m.false_boxes.size() << ", duplicates "
         << m.duplicates.size() << '\n';

@@ -8,6 +8,8 @@
 
 #include "harm.h"
 #include "scene.h"
+#include "site/carve_box.h"
+#include "site/gltf.h"
 #include "speed.h"
 
 namespace {
@@ -15,7 +17,7 @@ namespace {
 using namespace outcrop;
 
 struct Arguments {
-    std::string site, run, images = "images";
+    std::string site, run, glb, images = "images";
     std::vector<std::string> harms;
     bool is_speed = false;
     CarveOptions options;
@@ -46,6 +48,42 @@ void measure(const Arguments &arguments, const eval::Truth &truth, const eval::T
     }
 }
 
+double box_iou(const Obstacle &box, const eval::TrueObstacle &truth)
+{
+    return eval::iou(eval::Box{box.aabb_min, box.aabb_max}, truth.aabb);
+}
+
+// The run's box that overlaps the obstacle most; nothing when none does.
+const bench::PointBox *box_of(const std::vector<bench::PointBox> &boxes, const eval::TrueObstacle &truth)
+{
+    const bench::PointBox *best = nullptr;
+    for (const bench::PointBox &b : boxes)
+        if (box_iou(b.box, truth) > (best ? box_iou(best->box, truth) : 0)) best = &b;
+    return best;
+}
+
+// The run's boxes from points beside the final ones, with the site's masks as silhouettes.
+void measure_boxes(const Arguments &arguments, const eval::Truth &truth, const eval::TrueObstacle &obstacle,
+                   const std::vector<bench::PointBox> &boxes, GltfSite *parts)
+{
+    const bench::PointBox *found = box_of(boxes, obstacle);
+    if (!found) {
+        std::printf("%-14s has no box\n", obstacle.name.c_str());
+        return;
+    }
+    for (const std::string &harm : arguments.harms) {
+        std::vector<CarveView> views = bench::views_of(truth, obstacle.index, true, arguments.images);
+        bench::harm(harm, &views);
+        const auto [carved, final, misses] = carve_with_box(found->box, found->points, views, arguments.options);
+        std::printf("%-14s %-8s points %.3f final %.3f%s  hull %.3f, misses %d\n", obstacle.name.c_str(), harm.c_str(),
+                    box_iou(found->box, obstacle), box_iou(final.box, obstacle),
+                    final.has_volume ? "" : " (points alone)", bench::voxel_iou(carved.voxels, obstacle), misses);
+        if (harm != "none") continue;
+        parts->obstacles.push_back(final.box);
+        parts->surfaces.push_back({obstacle.index, mesh_of(carved.voxels)});
+    }
+}
+
 void run(const Arguments &arguments)
 {
     eval::Notes notes;
@@ -56,7 +94,15 @@ void run(const Arguments &arguments)
         bench::run_speed(bench::true_box(first), bench::views_of(truth, first.index, true, arguments.images));
         return;
     }
-    for (const eval::TrueObstacle &obstacle : *truth.obstacles) measure(arguments, truth, obstacle);
+    if (arguments.run.empty()) {
+        for (const eval::TrueObstacle &obstacle : *truth.obstacles) measure(arguments, truth, obstacle);
+        return;
+    }
+    const std::vector<bench::PointBox> boxes = bench::read_boxes(arguments.run);
+    GltfSite parts;
+    for (const eval::TrueObstacle &obstacle : *truth.obstacles)
+        measure_boxes(arguments, truth, obstacle, boxes, &parts);
+    if (!arguments.glb.empty()) write_glb(arguments.glb, parts);
 }
 
 } // namespace
@@ -73,6 +119,8 @@ int main(int argc, char **argv)
     app.add_option("--voxel", arguments.options.voxel_m, "side of a voxel, metres; 0: chosen");
     app.add_option("--difference", arguments.options.max_difference, "of colours, grey levels");
     app.add_option("--agreeing", arguments.options.min_agreeing, "share of the views");
+    app.add_option("--run", arguments.run, "a run's folder: its boxes from points, and the final ones, instead");
+    app.add_option("--glb", arguments.glb, "with --run: the carved surfaces and final boxes go there");
     app.add_flag("--speed", arguments.is_speed, "time a million voxels instead");
     CLI11_PARSE(app, argc, argv);
     if (arguments.harms.empty()) arguments.harms = bench::harms();
