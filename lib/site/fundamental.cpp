@@ -89,8 +89,7 @@ double samples_needed(double inlier_share, double confidence)
 
 void FundamentalOptions::check() const
 {
-    const bool is_good =
-        t_f_px > 0 && std::isfinite(t_f_px) && confidence > 0 && confidence < 1 && max_samples >= 1;
+    const bool is_good = t_f_px > 0 && std::isfinite(t_f_px) && confidence > 0 && confidence < 1 && max_samples >= 1;
     if (!is_good) throw std::invalid_argument("fundamental matrix: an option is out of range");
 }
 

@@ -107,8 +107,8 @@ std::vector<InvariantMatch> match_by_invariants(const std::vector<Invariants> &l
     };
     for (int i = 0; i < static_cast<int>(candidates.size()); i++) {
         const Candidate &c = candidates[static_cast<std::size_t>(i)];
-        like.push_back(likeness(left.at(static_cast<std::size_t>(c.left)), right.at(static_cast<std::size_t>(c.right)),
-                                options));
+        like.push_back(
+            likeness(left.at(static_cast<std::size_t>(c.left)), right.at(static_cast<std::size_t>(c.right)), options));
         challenge(&best_of_left[static_cast<std::size_t>(c.left)], i);
         challenge(&best_of_right[static_cast<std::size_t>(c.right)], i);
     }

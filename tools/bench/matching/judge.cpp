@@ -72,8 +72,8 @@ std::vector<PixelMatch> without_repeats(std::vector<PixelMatch> matches)
         if (first < kept.size() &&
             (kept[first].left_view != match.left_view || kept[first].right_view != match.right_view))
             first = kept.size();
-        const bool is_repeat = std::any_of(
-            kept.begin() + static_cast<std::ptrdiff_t>(first), kept.end(), [&](const PixelMatch &other) {
+        const bool is_repeat =
+            std::any_of(kept.begin() + static_cast<std::ptrdiff_t>(first), kept.end(), [&](const PixelMatch &other) {
                 return (other.left_px - match.left_px).norm() < kOnePlacePx &&
                        (other.right_px - match.right_px).norm() < kOnePlacePx;
             });

@@ -79,8 +79,7 @@ std::vector<int> true_partners(const SiteCase &site, const View &left, const Vie
     return out;
 }
 
-Funnel funnel_of(const SiteCase &site, const PreparedView &left, const PreparedView &right,
-                 const MatchOptions &options)
+Funnel funnel_of(const SiteCase &site, const PreparedView &left, const PreparedView &right, const MatchOptions &options)
 {
     const View &l = *left.posed().view, &r = *right.posed().view;
     const std::vector<int> partner = true_partners(site, l, r);
@@ -108,8 +107,9 @@ Funnel funnel_of(const SiteCase &site, const PreparedView &left, const PreparedV
     out.correlated = static_cast<int>(correlated.size());
     out.alike = static_cast<int>(alike.size());
     for (const Match &m : match_pair(left, right, site.area, options).pair.matches) {
-        const PixelMatch pixels = {l.id, r.id, pixel_of(left.junction(m.left_junction)),
-                                   pixel_of(right.junction(m.right_junction)), m.kind, m.score};
+        const PixelMatch pixels = {
+            l.id,   r.id,   pixel_of(left.junction(m.left_junction)), pixel_of(right.junction(m.right_junction)),
+            m.kind, m.score};
         out.best += alike.count(m.left_junction) && is_right(site, pixels);
     }
     return out;
@@ -167,7 +167,8 @@ nlohmann::ordered_json to_json(const Funnel &f)
 
 nlohmann::ordered_json to_json(const WrongMatches &wrong)
 {
-    return {{"near_px", wrong.near_px}, {"far_px", wrong.far_px}, {"hidden", wrong.hidden}, {"no_depth", wrong.no_depth}};
+    return {
+        {"near_px", wrong.near_px}, {"far_px", wrong.far_px}, {"hidden", wrong.hidden}, {"no_depth", wrong.no_depth}};
 }
 
 } // namespace outcrop::bench

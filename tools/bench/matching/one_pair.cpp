@@ -86,8 +86,7 @@ std::vector<Scored> match_colour(const SiteCase &site, const PairOfViews &pair, 
     for (int c = 0; c < 3; c++)
         channels.push_back(std::make_unique<ChannelCorrelator>(site, pair, c, geometry, method.match.correlate));
     std::vector<Scored> scored;
-    for (const Candidate &c :
-         find_candidates(geometry, left.posed(), right.posed(), site.area, method.match.strip)) {
+    for (const Candidate &c : find_candidates(geometry, left.posed(), right.posed(), site.area, method.match.strip)) {
         const auto chosen = grey.correlate(c.left, c.right, c.point);
         if (!chosen) continue;
         double sum = 0;
@@ -104,8 +103,7 @@ std::vector<Scored> match_invariants(const SiteCase &site, const PairOfViews &pa
     const View &r = site.views[static_cast<std::size_t>(pair.right)];
     oc_pair_t geometry;
     if (!prepare_pair(as_reported(l), as_reported(r), method.match.strip, &geometry)) return {};
-    const auto candidates =
-        find_candidates(geometry, as_reported(l), as_reported(r), site.area, method.match.strip);
+    const auto candidates = find_candidates(geometry, as_reported(l), as_reported(r), site.area, method.match.strip);
     const auto left = colour_invariants(site.pictures.at(static_cast<std::size_t>(pair.left)), l.junctions);
     const auto right = colour_invariants(site.pictures.at(static_cast<std::size_t>(pair.right)), r.junctions);
     std::vector<Scored> out;

@@ -15,17 +15,17 @@
 namespace outcrop::bench {
 namespace {
 
-constexpr int kNarrowings = 2;       // as match_pair
-constexpr double kSamePlacePx = 3;   // as MatchOptions
-constexpr int kCellPx = 40;             // as the spread of junctions
+constexpr int kNarrowings = 2;     // as match_pair
+constexpr double kSamePlacePx = 3; // as MatchOptions
+constexpr int kCellPx = 40;        // as the spread of junctions
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 cv::Ptr<cv::Feature2D> make(Feature feature)
 {
     switch (feature) {
-        case Feature::kSift: return cv::SIFT::create();
-        case Feature::kAkaze: return cv::AKAZE::create();
-        case Feature::kAffineSift: return cv::AffineFeature::create(cv::SIFT::create());
+    case Feature::kSift: return cv::SIFT::create();
+    case Feature::kAkaze: return cv::AKAZE::create();
+    case Feature::kAffineSift: return cv::AffineFeature::create(cv::SIFT::create());
     }
     return nullptr;
 }
@@ -130,7 +130,8 @@ PairMatches match_rival(const PosedView &left, const PosedView &right, const Des
     std::vector<Scored> scored;
     for (const Candidate &c : find_candidates(pair, left, right, area, options.strip))
         scored.push_back({c, distance_of(of_left.descriptors, c.left, of_right.descriptors, c.right)});
-    if (options.narrows_strip) narrow(pair, *left.view, *right.view, std::min(options.max_ratio, options.max_ratio_to_refine), &scored);
+    if (options.narrows_strip)
+        narrow(pair, *left.view, *right.view, std::min(options.max_ratio, options.max_ratio_to_refine), &scored);
     for (const Chosen &chosen : choose(scored, *left.view, *right.view, options.max_ratio)) {
         const Candidate &c = scored[static_cast<std::size_t>(chosen.index)].candidate;
         if (c.is_rival) continue;
@@ -170,9 +171,9 @@ std::vector<int> spread_order(const std::vector<cv::KeyPoint> &points, cv::Size 
 const char *name_of(Feature feature)
 {
     switch (feature) {
-        case Feature::kSift: return "SIFT + ratio";
-        case Feature::kAkaze: return "AKAZE + ratio";
-        case Feature::kAffineSift: return "AffineFeature(SIFT) + ratio";
+    case Feature::kSift: return "SIFT + ratio";
+    case Feature::kAkaze: return "AKAZE + ratio";
+    case Feature::kAffineSift: return "AffineFeature(SIFT) + ratio";
     }
     return "";
 }
@@ -215,8 +216,7 @@ Matcher rival_matcher(const std::vector<Described> &described, const RivalOption
         std::vector<PairMatches> out;
         for (const ViewPair &pair : select_pairs(pass.views, pass.area, options.pairs)) {
             const auto l = static_cast<std::size_t>(pair.left), r = static_cast<std::size_t>(pair.right);
-            out.push_back(
-                match_rival(pass.views[l], pass.views[r], described[l], described[r], pass.area, now));
+            out.push_back(match_rival(pass.views[l], pass.views[r], described[l], described[r], pass.area, now));
         }
         return out;
     };

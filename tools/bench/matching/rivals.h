@@ -27,7 +27,7 @@ Described describe(Feature feature, const cv::Mat1b &grey);
 std::vector<View> with_points(const std::vector<View> &views, const std::vector<Described> &described);
 
 struct RivalOptions {
-    double max_ratio = 0.8; /* best over second best distance at another place, both ways; less is stricter */
+    double max_ratio = 0.8;           /* best over second best distance at another place, both ways; less is stricter */
     double max_ratio_to_refine = 0.6; /* of the matches that only serve to refine poses and to narrow strips */
     PairOptions pairs;
     StripOptions strip;

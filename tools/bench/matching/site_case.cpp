@@ -43,7 +43,6 @@ std::vector<View> views_of(const Scene &scene, bool finds_all)
     if (finds_all) {
         config.max_sent_junctions = OC_MAX_JUNCTIONS;
         config.judoca.max_junctions = OC_MAX_JUNCTIONS;
-        if (getenv("CORN")) config.judoca.max_corners = atoi(getenv("CORN"));
     }
     const Vehicle vehicle(config);
     PacketAssembler assembler;
@@ -105,7 +104,11 @@ oc_camera_t true_camera(const SiteCase &site, int view_id)
 {
     const eval::Camera &camera = site.truth.views.at(static_cast<std::size_t>(view_id));
     oc_camera_t out{};
-    out.k = {camera.fx, camera.fy, camera.cx, camera.cy, static_cast<std::uint32_t>(camera.width),
+    out.k = {camera.fx,
+             camera.fy,
+             camera.cx,
+             camera.cy,
+             static_cast<std::uint32_t>(camera.width),
              static_cast<std::uint32_t>(camera.height)};
     for (int i = 0; i < 9; i++) out.pose.R[i] = camera.rotation_cam_from_world(i / 3, i % 3);
     for (int i = 0; i < 3; i++) out.pose.t[i] = camera.translation_m[i];

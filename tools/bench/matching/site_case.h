@@ -16,7 +16,7 @@ struct SiteCaseOptions {
     std::string site;
     std::string images;          /* folder name instead of the views' own, or "" */
     std::string poses = "exact"; /* "exact", or as --perturb of outcrop-drive: "1", "2:drift" */
-    bool finds_all = false;      /* every junction the detector's limits let through, corners too, not what a link bears */
+    bool finds_all = false;      /* every junction the detector's limits let through, not only what a link bears */
 };
 
 struct SiteCase {

@@ -49,8 +49,7 @@ Json measure_table_5_3(const SiteCase &site, const PairOfViews &pair)
                         kPrinted[w][t][1], kPrinted[w][t][0], a.correct, a.n, b.correct, b.n);
         }
     }
-    return {{"site", site.name}, {"poses", site.poses},        {"left", pair.left},
-            {"right", pair.right}, {"rows", rows}};
+    return {{"site", site.name}, {"poses", site.poses}, {"left", pair.left}, {"right", pair.right}, {"rows", rows}};
 }
 
 Json measure_methods(const SiteCase &site, const std::vector<PairOfViews> &pairs, const std::string &title,
@@ -68,8 +67,13 @@ Json measure_methods(const SiteCase &site, const std::vector<PairOfViews> &pairs
         rows.push_back(row);
         std::printf("  %-62s %4d of %4d\n", method.name.c_str(), sum.correct, sum.n);
     }
-    return {{"title", title},         {"site", site.name}, {"poses", site.poses}, {"pairs", pairs.size()},
-            {"window_px", thresholds.window_px}, {"printed", printed},   {"rows", rows}};
+    return {{"title", title},
+            {"site", site.name},
+            {"poses", site.poses},
+            {"pairs", pairs.size()},
+            {"window_px", thresholds.window_px},
+            {"printed", printed},
+            {"rows", rows}};
 }
 
 std::vector<PairOfViews> pairs_between(const SiteCase &site, double min_deg, double max_deg)

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Our matches beside the rivals' at pairs 40 to 60 degrees apart.
 #include "wide.h"
-#include "losses.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <functional>
+#include <optional>
+
+#include "losses.h"
 
 namespace outcrop::bench {
 namespace {
@@ -12,6 +16,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
+constexpr double kUsualRatio = 0.8;
+constexpr double kPrecision = 0.95;
 constexpr double kDegree = 3.14159265358979323846 / 180;
 
 double mean_points(const std::vector<View> &views)
@@ -21,22 +27,23 @@ double mean_points(const std::vector<View> &views)
     return sum / static_cast<double>(views.size());
 }
 
-void put(const std::string &name, const std::vector<View> &views, const SiteCase &site, const SiteModel &model,
-         Clock::time_point begin, WideCase *out)
+// Runs one method and adds what it finds.
+void add(const std::string &name, const SiteCase &site, const std::vector<View> &views,
+         const std::function<SiteModel()> &build, WideCase *out)
 {
+    const auto begin = Clock::now();
+    const SiteModel model = build();
     const double ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
-    const MatchCount count = count_matches(site, pixel_matches(views, model.pairs));
+    const std::vector<PixelMatch> matches = without_repeats(pixel_matches(views, model.pairs));
+    const MatchCount count = count_matches(site, matches);
     out->n_pairs = static_cast<int>(model.pairs.size());
     out->counts[name] = count;
-    Json row = {{"name", name}, {"points", mean_points(views)}, {"model_ms", ms}};
-    if (getenv("DUMP")) std::printf("%.0f ms\n", ms);
+    Json row = {{"method", name}, {"points", mean_points(views)}, {"ms", ms}};
     row.update(to_json(count));
-    row["wrong"] = to_json(sort_wrong(site, without_repeats(pixel_matches(views, model.pairs))));
-    if (getenv("DUMP")) std::printf("%s\n", row["wrong"].dump().c_str());
+    row["wrong"] = to_json(sort_wrong(site, matches));
     out->json["methods"].push_back(row);
-    std::printf("  %-34s %6.0f points, %5d matches, %5d correct, %5d of them on obstacles; ground %5d, %5d\n",
-                name.c_str(), mean_points(views), count.n, count.correct, count.correct_on_obstacle, count.ground_n,
-                count.ground_correct);
+    std::printf("  %-32s %5.0f points, %5d of %5d right, %5d on obstacles\n", name.c_str(), mean_points(views),
+                count.correct, count.n, count.correct_on_obstacle);
     std::fflush(stdout);
 }
 
@@ -45,6 +52,11 @@ std::string with_ratio(Feature feature, double ratio)
     char text[16];
     std::snprintf(text, sizeof text, " %.2f", ratio);
     return name_of(feature) + std::string(text);
+}
+
+const std::vector<double> &ratios_of(Feature feature, const WideOptions &options)
+{
+    return feature == Feature::kAffineSift ? options.affine_ratios : options.ratios;
 }
 
 } // namespace
@@ -69,46 +81,91 @@ const std::vector<Described> &Descriptions::of(const SiteCase &site, Feature fea
     return known;
 }
 
-WideCase measure_wide(const SiteCase &site, const WideOptions &options, Descriptions *descriptions)
+WideCase measure_wide(const SiteCase &site, const SiteCase &all, const WideOptions &options, Descriptions *descriptions)
 {
     WideCase out;
     BuildOptions build;
     build.pairs = wide_pairs();
-    if (getenv("MS")) build.match.min_score = atof(getenv("MS"));
-    if (getenv("MM")) build.match.min_margin = atof(getenv("MM"));
-    if (getenv("CR")) build.match.correlate.coarse_reject = atof(getenv("CR"));
-    if (getenv("MF")) build.match.correlate.max_fine = atoi(getenv("MF"));
-    if (getenv("WIN")) build.match.correlate.window_px = atoi(getenv("WIN"));
-    if (getenv("GS")) build.match.correlate.gauss_sigma_px = atof(getenv("GS"));
-    if (getenv("SM")) build.match.correlate.smooth_sigma_px = atof(getenv("SM"));
-    if (getenv("WEDGE")) build.match.correlate.support = Support::kWedge;
-    if (getenv("DEN")) build.third_views.max_denied = atof(getenv("DEN"));
-    if (getenv("REP")) build.tracks.max_reprojection_px = atof(getenv("REP"));
     std::printf("%s, poses %s\n", site.name.c_str(), site.poses.c_str());
-    out.json = {{"site", site.name}, {"poses", site.poses}, {"methods", Json::array()}};
-    auto begin = Clock::now();
-    put("ours", site.views, site, build_site(site.views, site.area, build), begin, &out);
-    begin = Clock::now();
+    out.json = {{"site", site.name}, {"poses", site.poses}, {"pairs", 0}, {"methods", Json::array()}};
+    const auto ours = [&](const SiteCase &from) { return build_site(from.views, from.area, build); };
+    add(
+        "ours", site, site.views, [&] { return ours(site); }, &out);
+    add(
+        "ours, every junction", all, all.views, [&] { return ours(all); }, &out);
+    build.match.correlate.support = Support::kWedge;
+    add(
+        "ours, wedge", site, site.views, [&] { return ours(site); }, &out);
+    build.match.correlate.support = Support::kWindow;
     build.with_third_views = false;
-    put("ours, two views only", site.views, site, build_site(site.views, site.area, build), begin, &out);
-    if (getenv("DUMP")) {
-    out.json["funnel"] = to_json(measure_funnel(site, build.pairs, build.match));
-    std::printf("%s\n", out.json["funnel"].dump().c_str());
-    }
+    add(
+        "ours, two views only", site, site.views, [&] { return ours(site); }, &out);
+    out.json["losses"] = to_json(measure_funnel(site, build.pairs, build.match));
     for (const Feature feature : options.features) {
         const std::vector<Described> &described = descriptions->of(site, feature);
         const std::vector<View> views = with_points(site.views, described);
-        for (const double ratio : feature == Feature::kAffineSift ? options.affine_ratios : options.ratios) {
+        for (const double ratio : ratios_of(feature, options)) {
             RivalOptions rival;
             rival.max_ratio = ratio;
             rival.pairs = build.pairs;
-            begin = Clock::now();
-            const SiteModel model = build_from_matches(views, site.area, rival_matcher(described, rival), build);
-            put(with_ratio(feature, ratio), views, site, model, begin, &out);
+            add(
+                with_ratio(feature, ratio), site, views,
+                [&] { return build_from_matches(views, site.area, rival_matcher(described, rival), build); }, &out);
         }
     }
     out.json["pairs"] = out.n_pairs;
     return out;
+}
+
+namespace {
+
+// The laxest ratio whose matches are right in 95 %; nothing when none is.
+std::optional<double> ratio_at_95(Feature feature, const WideCounts &sums, const WideOptions &options)
+{
+    std::optional<double> out;
+    for (const double ratio : ratios_of(feature, options)) {
+        const MatchCount &count = sums.at(with_ratio(feature, ratio));
+        if (count.n > 0 && count.correct >= kPrecision * count.n) out = std::max(out.value_or(ratio), ratio);
+    }
+    return out;
+}
+
+Json over(const MatchCount &ours, const MatchCount &rival)
+{
+    if (rival.correct_on_obstacle == 0) return nullptr;
+    return static_cast<double>(ours.correct_on_obstacle) / rival.correct_on_obstacle;
+}
+
+} // namespace
+
+Json sum_wide(const std::string &title, const std::vector<WideCase> &cases, const WideOptions &options)
+{
+    WideCounts sums;
+    Json names = Json::array();
+    int n_pairs = 0;
+    for (const WideCase &one : cases) {
+        for (const auto &[name, count] : one.counts) sums[name].add(count);
+        names.push_back(one.json["site"].get<std::string>() + ", " + one.json["poses"].get<std::string>());
+        n_pairs += one.n_pairs;
+    }
+    Json rows = Json::array();
+    for (const auto &[name, count] : sums) {
+        rows.push_back({{"method", name}});
+        rows.back().update(to_json(count));
+    }
+    Json ratios = Json::array();
+    const MatchCount &ours = sums["ours"];
+    for (const Feature feature : options.features) {
+        const auto at_95 = ratio_at_95(feature, sums, options);
+        ratios.push_back(
+            {{"rival", name_of(feature)},
+             {"ratio", kUsualRatio},
+             {"ours_over_rival", over(ours, sums[with_ratio(feature, kUsualRatio)])},
+             {"ratio_at_95", at_95 ? Json(*at_95) : Json(nullptr)},
+             {"ours_over_rival_at_95", at_95 ? over(ours, sums[with_ratio(feature, *at_95)]) : Json(nullptr)}});
+        std::printf("%s: %s\n", title.c_str(), ratios.back().dump().c_str());
+    }
+    return {{"title", title}, {"cases", names}, {"pairs", n_pairs}, {"methods", rows}, {"ratios", ratios}};
 }
 
 } // namespace outcrop::bench

@@ -21,11 +21,11 @@ using WideCounts = std::map<std::string, MatchCount>;
 
 struct WideOptions {
     std::vector<Feature> features = {Feature::kSift, Feature::kAkaze, Feature::kAffineSift};
-    std::vector<double> ratios = {0.5, 0.6, 0.7, 0.8, 0.9};
-    std::vector<double> affine_ratios = {0.6, 0.8}; /* affine SIFT takes a minute a site for each */
+    std::vector<double> ratios = {0.5, 0.6, 0.7, 0.8, 0.9}; /* 0.8, the usual one, must be among them */
+    std::vector<double> affine_ratios = {0.8};              /* affine SIFT takes long */
 };
 
-/* Points of all views, made once for every case of the same pictures. */
+/* Points of all views by one detector, made once for every case of the same pictures. */
 class Descriptions {
 public:
     const std::vector<Described> &of(const SiteCase &site, Feature feature);
@@ -35,13 +35,21 @@ private:
 };
 
 /* Each method through build_site or build_from_matches: ties, sure matches, refined poses, all matches in the narrow
- * strips, tracks. "ours" is the product's; "ours, two views only" leaves out the check in third views, which the rivals
- * do not have. A rival's name ends in its ratio. */
+ * strips, tracks. "ours" is the product's; "two views only" leaves out the check in third views, which the rivals do
+ * not have; "wedge" correlates the wedge between the branches; "every junction" takes all that the detector's limits
+ * let through, which `all` holds. A rival's name ends in its ratio. */
 struct WideCase {
     int n_pairs = 0;
     WideCounts counts;
-    nlohmann::ordered_json json; /* {"site", "poses", "pairs", "junctions", "methods": [{"name", "points", ...}]} */
+    nlohmann::ordered_json json; /* {"site", "poses", "pairs", "methods": [{"method", "points", ...}], "losses"} */
 };
-WideCase measure_wide(const SiteCase &site, const WideOptions &options, Descriptions *descriptions);
+WideCase measure_wide(const SiteCase &site, const SiteCase &all, const WideOptions &options,
+                      Descriptions *descriptions);
+
+/* Sums of cases, and how our right matches on obstacles compare: {"title", "cases", "pairs", "methods", "ratios":
+ * [{"rival", "ratio_at", "ours_over_rival", "ours_over_rival_at_95"}]}. The last compares with the laxest ratio whose
+ * precision is 95 % or more, null when none is. */
+nlohmann::ordered_json sum_wide(const std::string &title, const std::vector<WideCase> &cases,
+                                const WideOptions &options);
 
 } // namespace outcrop::bench
