@@ -4,8 +4,9 @@
 
 tools/bench_report.py --from DIR                       DIR: accuracy.json, repeatability.json, thesis.json, ...
 tools/bench_report.py --from DIR --print               the bench's part to standard output, docs/ is left alone
+tools/bench_report.py --matching DIR                   DIR: matching.json, colmap.json; into docs/matching.json
 tools/bench_report.py                                  writes pictures and measurements.md again from docs/bench.json
-tools/bench_report.py --check                          exit 1 unless docs are what bench.json, measurements.json and soak.json make
+tools/bench_report.py --check                          exit 1 unless docs are what their .json files make
 
 tools/bench.sh runs the programs and then this. Standard library only.
 """
@@ -63,30 +64,44 @@ def one_per_line(value, depth=0):
     return json.dumps(value, separators=(",", ":"))
 
 
+def stored(name):
+    """None when docs/ does not hold it."""
+    file = DOCS / name
+    return json.loads(file.read_text()) if file.is_file() else None
+
+
+def gather_matching(folder):
+    out = {"machine": about_machine.text(), "matching": rounded(json.loads((folder / "matching.json").read_text()))}
+    if (folder / "colmap.json").is_file():
+        out["colmap"] = rounded(json.loads((folder / "colmap.json").read_text()))
+    return out
+
+
 def documents(bench):
     """{path under docs: text} of all that follows from the measurements."""
     files = {"pictures/" + name: text for name, text in bench_plot.pictures(bench).items()}
     measured = DOCS / "measurements.json"
     if measured.is_file():
-        soak = DOCS / "soak.json"
-        files["measurements.md"] = measure_document.text(json.loads(measured.read_text()), bench,
-                                                         json.loads(soak.read_text()) if soak.is_file() else None)
+        files["measurements.md"] = measure_document.text(json.loads(measured.read_text()), bench, stored("soak.json"),
+                                                         stored("matching.json"))
     return files
 
 
 def main():
     parser = argparse.ArgumentParser(description="Writes the bench's figures into docs/.")
     parser.add_argument("--from", dest="source", type=pathlib.Path, metavar="DIR", help="what the programs wrote")
+    parser.add_argument("--matching", type=pathlib.Path, metavar="DIR", help="what matching.sh's programs wrote")
     parser.add_argument("--print", action="store_true", help="to standard output; docs/ is left alone")
     parser.add_argument("--check", action="store_true", help="compare only; exit 1 when docs are not up to date")
     options = parser.parse_args()
-    stored = DOCS / "bench.json"
-    bench = gather(options.source) if options.source else json.loads(stored.read_text())
+    bench = gather(options.source) if options.source else stored("bench.json")
+    if options.matching and not options.check:
+        (DOCS / "matching.json").write_text(one_per_line(gather_matching(options.matching)) + "\n")
     if options.print:
         print(bench_document.text(bench))
         return 0
     if options.source and not options.check:
-        stored.write_text(one_per_line(bench) + "\n")
+        (DOCS / "bench.json").write_text(one_per_line(bench) + "\n")
     stale = []
     for name, text in documents(bench).items():
         file = DOCS / name
@@ -96,7 +111,7 @@ def main():
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(text)
     for name in stale:
-        print(f"docs/{name} is not what docs/bench.json, docs/measurements.json and docs/soak.json make: run tools/bench_report.py")
+        print(f"docs/{name} is not what the .json files of docs/ make: run tools/bench_report.py")
     return 1 if stale else 0
 
 

@@ -281,7 +281,7 @@ def json_text(result):
 
 
 def part(name):
-    """What tools/bench.sh or tools/soak.sh measured last, or None."""
+    """What tools/bench.sh, soak.sh or matching.sh measured last, or None."""
     file = ROOT / "docs" / name
     return json.loads(file.read_text()) if file.is_file() else None
 
@@ -290,7 +290,8 @@ def main():
     options = parse_options()
     result = collect(options)
     is_partial = options.quick or options.only
-    document = measure_document.text(result, *([] if is_partial else [part("bench.json"), part("soak.json")]))
+    document = measure_document.text(result, *([] if is_partial else [part("bench.json"), part("soak.json"),
+                                                               part("matching.json")]))
     if is_partial:
         print(document)
     else:

@@ -3,6 +3,7 @@
 from statistics import mean, median
 
 import bench_document
+import matching_document
 import soak_document
 
 MIN_IOU = 0.3          # an obstacle below it counts as missed, as outcrop-eval counts
@@ -363,9 +364,9 @@ def times_section(result):
             vehicle_table(runs) + "\nThe base by step, the whole drive, the evaluation:\n\n" + base_table(runs) + "\n")
 
 
-def text(result, bench=None, soak=None):
-    """bench, soak: what docs/bench.json and docs/soak.json hold, whose parts stand at the end."""
+def text(result, bench=None, soak=None, matching=None):
+    """bench, soak, matching: what docs/bench.json, soak.json and matching.json hold, whose parts stand at the end."""
     parts = [head_section(result), targets_section(result), same_boxes_section(result), seeds_section(result),
              sites_section(result), repeats_section(result), real_section(result), times_section(result)]
-    parts += [soak_document.text(soak), bench_document.text(bench) if bench else ""]
+    parts += [soak_document.text(soak), matching_document.text(matching), bench_document.text(bench) if bench else ""]
     return "".join(parts).rstrip() + "\n"

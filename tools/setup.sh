@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Installs what Outcrop needs on Debian 12: packages that are missing, then LCM and Unity into third_party/.
-# Asks nothing, may be repeated, touches nothing that is already there. --dev adds what only maintainers use.
+# Asks nothing, may be repeated, touches nothing that is already there. --dev adds what only maintainers use,
+# --peers the programs that tools/peer_colmap.py compares with.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 export LC_ALL=C
@@ -23,12 +24,15 @@ packages=(
     ca-certificates debian-archive-keyring dpkg-dev xz-utils
 )
 developer_packages=(clang-tidy-14 python3-opencv)
+peer_packages=(colmap)
 
-case "${1-}" in
-    "") ;;
-    --dev) packages+=("${developer_packages[@]}") ;;
-    *) die "usage: tools/setup.sh [--dev]" ;;
-esac
+for option in "$@"; do
+    case "$option" in
+        --dev) packages+=("${developer_packages[@]}") ;;
+        --peers) packages+=("${peer_packages[@]}") ;;
+        *) die "usage: tools/setup.sh [--dev] [--peers]" ;;
+    esac
+done
 
 # ---- Debian packages
 

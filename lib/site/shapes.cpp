@@ -28,12 +28,13 @@ std::vector<Shape> carve_shapes(const std::vector<std::vector<CarveView>> &views
             here.grow_share = 0;
             here.grow_m = asked_grow_share * largest_side(box);
             here.max_regrows = 0;
-            Carved carved = carve_obstacle(box, views[i], here);
-            if (!carved.is_usable()) continue;
             std::vector<SitePoint> points;
             for (const SitePoint &point : model->points)
                 if (point.obstacle == static_cast<int>(i)) points.push_back(point);
-            box = final_box(box, points, carved, views[i]).box;
+            CarvedBox both = carve_with_box(box, points, views[i], here);
+            Carved &carved = both.carved;
+            if (!carved.is_usable()) continue;
+            box = both.box.box;
             box.voxel_m = carved.voxels.grid.cell_m;
             n_voxels += static_cast<double>(carved.voxels.grid.size());
             n_by_colour += static_cast<double>(carved.n_colour_removed);
