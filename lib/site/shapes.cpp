@@ -34,7 +34,7 @@ std::vector<Shape> carve_shapes(const std::vector<std::vector<CarveView>> &views
             CarvedBox both = carve_with_box(box, points, views[i], here);
             Carved &carved = both.carved;
             if (!carved.is_usable()) continue;
-            box = both.box.box;
+            box = both.final.box;
             box.voxel_m = carved.voxels.grid.cell_m;
             n_voxels += static_cast<double>(carved.voxels.grid.size());
             n_by_colour += static_cast<double>(carved.n_colour_removed);
