@@ -210,7 +210,10 @@ private:
     void refine()
     {
         settle();
-        refine_on(tracks_);
+        std::vector<Track> sure;
+        for (const Track &track : tracks_)
+            if (!track.is_doubtful) sure.push_back(track);
+        refine_on(sure);
     }
 
     // From the reported poses anew, with all there is: the vehicle's ties and these tracks.
@@ -237,14 +240,16 @@ private:
                                 model_.area, options_.tracks, &model_.counts);
     }
 
-    // Matches that no settled track holds are left out; the others take its point.
+    // Matches that no sure track holds are left out; the others take its point.
     void keep_matches()
     {
         std::map<int, int> index;
         for (std::size_t i = 0; i < views_.size(); ++i) index[views_[i].id] = static_cast<int>(i);
         std::map<TrackPixel, const Track *> track_of;
-        for (const Track &track : tracks_)
+        for (const Track &track : tracks_) {
+            if (track.is_doubtful) continue;
             for (const TrackPixel &p : track.pixels) track_of[p] = &track;
+        }
         double n_matches = 0;
         for (PairMatches &pair : model_.pairs) {
             std::vector<Match> kept;
@@ -300,6 +305,7 @@ private:
             point.covariance = track.fit.covariance;
             point.n_views = static_cast<int>(track.pixels.size());
             point.score = track.score;
+            point.is_doubtful = track.is_doubtful;
             point.colour = colour_of(track);
             model_.points.push_back(point);
         }

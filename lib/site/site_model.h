@@ -47,7 +47,8 @@ struct SitePoint {
     int n_views = 2;
     double score = 0;
     cv::Vec3b colour{200, 200, 200};
-    int obstacle = -1; // index in SiteModel::obstacles, -1: none, -2: suspected
+    bool is_doubtful = false; // a sign that something may stand here, but no match to build on
+    int obstacle = -1;        // index in SiteModel::obstacles, -1: none, -2: suspected
 };
 
 // A bounding box standing on the ground.
