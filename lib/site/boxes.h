@@ -14,7 +14,7 @@ namespace outcrop {
 struct BoxOptions {
     // A point seen by two views only has no say in the box when its second nearest neighbour in the cluster is farther
     // than this many times the median of such distances; in clusters of at least min_isolation_points. 0: all have.
-    double isolation = 3.0;
+    double isolation = 2.7;
     int min_isolation_points = 8;
     double trim_share = 0.02;  // of the points may lie outside at each end ...
     double trim_gap = 0.4;     // ... but only while each widens the extent of the rest by more than this share
