@@ -62,12 +62,22 @@ struct Obstacle {
     bool is_suspected = false; // few points: shown, never dropped silently
 };
 
+enum class Severity { kNote, kWarning, kFault };
+
+// What the model says of itself; a fault: nothing in it may be relied on.
+struct Statement {
+    std::string code; // stable, for programs
+    std::string text; // one sentence
+    Severity severity = Severity::kNote;
+};
+
 struct SiteModel {
     std::vector<RefinedView> views; // ascending id
     std::vector<PairMatches> pairs; // ascending (left, right)
     std::vector<SitePoint> points;
     std::vector<Obstacle> obstacles; // is_suspected false
     std::vector<Obstacle> suspected;
+    std::vector<Statement> quality;  // no statement: no reservations
     Area area;
     std::map<std::string, double> counts; // for the report
     std::map<std::string, double> ms;     // time per step; not part of equality
