@@ -54,6 +54,9 @@ void make_boxes(const Clusters &clusters, double diagonal_m, const BoxOptions &o
 // Is a ground point inside the oriented footprint grown by `grow_m`?
 bool footprint_contains(const Obstacle &box, double x, double y, double grow_m = 0);
 
+// By how much the oriented footprint has to grow to hold a ground point; 0 inside.
+double distance_outside(const Obstacle &box, double x, double y);
+
 // Intersection over union of axis-aligned boxes.
 double aabb_iou(const Eigen::Vector3d &min_a, const Eigen::Vector3d &max_a, const Eigen::Vector3d &min_b,
                 const Eigen::Vector3d &max_b);

@@ -108,6 +108,7 @@ void BuildOptions::check() const
     refine.check();
     cluster.check();
     boxes.check();
+    suspects.check();
     quality.check();
     if (passes < 1 || passes > 10) throw std::invalid_argument("model: passes must be 1..10");
     if (!(area_z_share > 0) || !(area_reach > 0)) throw std::invalid_argument("model: area shares must be > 0");
@@ -182,6 +183,7 @@ public:
             keep_matches();
             make_points();
             group();
+            look_for_suspects();
         }
         judge_all();
         return std::move(model_);
@@ -341,6 +343,15 @@ private:
         model_.counts["t_m_m"] = clusters.t_m_m;
         model_.counts["obstacles"] = static_cast<double>(model_.obstacles.size());
         model_.counts["suspected"] = static_cast<double>(model_.suspected.size());
+    }
+
+    void look_for_suspects()
+    {
+        std::set<std::pair<int, int>> matched;
+        for (const Track &track : tracks_)
+            for (const TrackPixel &p : track.pixels) matched.insert({p.view, p.junction});
+        model_.suspects = find_suspects(views_, matched, model_, options_.suspects);
+        model_.counts["suspect_places"] = static_cast<double>(model_.suspects.size());
     }
 
     void judge_all()

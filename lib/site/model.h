@@ -13,6 +13,7 @@
 #include "site/quality.h"
 #include "site/refine.h"
 #include "site/site_model.h"
+#include "site/suspects.h"
 #include "site/tracks.h"
 #include "site/view.h"
 
@@ -28,6 +29,7 @@ struct BuildOptions {
     RefineOptions refine;
     ClusterOptions cluster;
     BoxOptions boxes;
+    SuspectOptions suspects;
     QualityOptions quality;
     int passes = 2;            // of matching; refinement comes after each but is left out when every pose is exact
     bool ties_first = true;    // refine on the vehicle's ground ties alone before the first pass: narrower strips
