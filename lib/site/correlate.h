@@ -35,7 +35,7 @@ enum class Warp {
 
 struct CorrelateOptions {
     Measure measure = Measure::kVnc;
-    Support support = Support::kWedge;
+    Support support = Support::kWindow;
     Warp warp = Warp::kHomography;
     bool with_extra_planes = true; // also a level, a facing and three upright planes through the point
     int window_px = 21;            // side, odd, 7..31

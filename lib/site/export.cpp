@@ -193,9 +193,10 @@ void write_model_dir(const std::string &dir, const SiteModel &model, const std::
 {
     // All texts first: a fault in one leaves the folder as it was.
     const std::string matches = text_of(dir + "/matches.json", matches_json(model, views));
-    const std::string obstacles = text_of(
-        dir + "/model/obstacles.json",
-        {{"units", "m"}, {"obstacles", boxes_json(model.obstacles)}, {"suspected", boxes_json(model.suspected)}, {"quality", quality_json(model.quality)}});
+    const std::string obstacles = text_of(dir + "/model/obstacles.json", {{"units", "m"},
+                                                                          {"obstacles", boxes_json(model.obstacles)},
+                                                                          {"suspected", boxes_json(model.suspected)},
+                                                                          {"quality", quality_json(model.quality)}});
     const std::string cameras = text_of(dir + "/model/cameras.json", cameras_json(model));
     const std::string points = points_ply(model.points);
     std::filesystem::create_directories(dir + "/model");

@@ -15,8 +15,8 @@ namespace outcrop {
 enum class GroundCode : std::uint8_t { kUnseen = 96, kFree = 255, kObstacle = 0, kSuspected = 176 };
 
 struct GroundMapOptions {
-    double cell_m = 0;            // 0: the area's longer side / 400
-    int min_views = 2;            // that must see a cell for it to be free
+    double cell_m = 0; // 0: the area's longer side / 400
+    int min_views = 2; // that must see a cell for it to be free
     // The ring round a box that stays suspected, in shares of its footprint's diagonal: ring_sampling over the root of
     // its number of points, within these bounds.
     double ring_sampling = 1.0, ring_share = 0.06, max_ring_share = 0.25;

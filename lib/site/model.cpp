@@ -371,10 +371,10 @@ private:
     double diagonal_ = 0;
     bool is_exact_ = true;
     int n_ground_sightings_ = 0, n_ground_misfits_ = 0; // of the last refinement
-    bool is_refined_ = false;           // cameras_ and margins_ come from refine_poses
-    std::vector<oc_camera_t> cameras_;  // as believed now
-    std::vector<oc_margin_t> margins_;  // for matching
-    std::vector<Matrix6d> covariances_; // of the poses, between views
+    bool is_refined_ = false;                           // cameras_ and margins_ come from refine_poses
+    std::vector<oc_camera_t> cameras_;                  // as believed now
+    std::vector<oc_margin_t> margins_;                  // for matching
+    std::vector<Matrix6d> covariances_;                 // of the poses, between views
     std::vector<Track> merged_, tracks_;
 };
 

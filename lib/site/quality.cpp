@@ -196,7 +196,7 @@ private:
                     std::to_string(std::lround(n_matched)) + " matches were found.");
         const double n_merged = count(model_, "tracks_merged");
         const double n_dropped = count(model_, "tracks_inconsistent") + count(model_, "tracks_uncertain") +
-                                 count(model_, "tracks_below_ground");
+                                 count(model_, "tracks_below_ground") + count(model_, "tracks_doubtful");
         if (n_merged >= options_.min_ground_sightings && n_dropped > options_.max_dropped_share * n_merged)
             say(Severity::kFault, "poses_too_poor",
                 percent(n_dropped / n_merged) + " of what was matched does not come together in space.");
@@ -279,8 +279,8 @@ private:
 
 void QualityOptions::check() const
 {
-    const double shares[] = {min_baseline_share, max_place_share,   margin_slack,      margin_sigmas,
-                             max_outside_share,  min_match_share,   max_dropped_share, max_ground_misfit_share};
+    const double shares[] = {min_baseline_share, max_place_share, margin_slack,      margin_sigmas,
+                             max_outside_share,  min_match_share, max_dropped_share, max_ground_misfit_share};
     for (const double share : shares)
         if (!(share >= 0)) throw std::invalid_argument("quality: shares and sigmas must be >= 0");
     if (min_ground_sightings < 1 || min_obstacle_junctions < 1 || max_obstacles < 1)

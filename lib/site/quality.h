@@ -10,17 +10,17 @@
 namespace outcrop {
 
 struct QualityOptions {
-    double min_baseline_share = 0.01;    // of the mean camera height: views nearer than this are all alike
-    double max_place_share = 0.5;        // a box whose place is less certain (99 %) than this share of its lesser side
-                                         // is only suspected
-    double margin_slack = 1.5;           // a pose moved by more margins than this is outside of them ...
-    double margin_sigmas = 3;            // ... and by more of its posterior's sigmas beyond
-    double max_outside_share = 0.2;      // of the views that may be outside
+    double min_baseline_share = 0.01;     // of the mean camera height: views nearer than this are all alike
+    double max_place_share = 0.5;         // a box whose place is less certain (99 %) than this share of its lesser side
+                                          // is only suspected
+    double margin_slack = 1.5;            // a pose moved by more margins than this is outside of them ...
+    double margin_sigmas = 3;             // ... and by more of its posterior's sigmas beyond
+    double max_outside_share = 0.2;       // of the views that may be outside
     double max_ground_misfit_share = 0.3; // of the ground sightings that a flat ground does not explain
-    int min_ground_sightings = 20;       // fewer say nothing of the ground's shape
-    double min_match_share = 0.03;       // of the obstacle junctions of all views that must be matched ...
-    int min_obstacle_junctions = 60;     // ... when there are so many
-    double max_dropped_share = 0.5;      // of the merged tracks that may turn out inconsistent or too uncertain
+    int min_ground_sightings = 20;        // fewer say nothing of the ground's shape
+    double min_match_share = 0.03;        // of the obstacle junctions of all views that must be matched ...
+    int min_obstacle_junctions = 60;      // ... when there are so many
+    double max_dropped_share = 0.5;       // of the merged tracks that may turn out inconsistent or too uncertain
     int max_obstacles = 200;
     void check() const; // throws std::invalid_argument
 };

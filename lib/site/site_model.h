@@ -78,7 +78,7 @@ struct SiteModel {
     std::vector<Obstacle> obstacles; // is_suspected false
     std::vector<Obstacle> suspected;
     std::vector<Eigen::Vector2d> suspects; // places on the ground where something low may stand (suspects.h)
-    std::vector<Statement> quality;  // no statement: no reservations
+    std::vector<Statement> quality;        // no statement: no reservations
     Area area;
     std::map<std::string, double> counts; // for the report
     std::map<std::string, double> ms;     // time per step; not part of equality

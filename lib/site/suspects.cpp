@@ -80,9 +80,8 @@ std::vector<Vector2d> find_suspects(const std::vector<View> &views, const std::s
         const Hit &a = hits[static_cast<std::size_t>(n.a)], &b = hits[static_cast<std::size_t>(n.b)];
         if (a.view != b.view) suspects.push_back((a.at + b.at).head<2>() / 2);
     }
-    std::sort(suspects.begin(), suspects.end(), [](const Vector2d &a, const Vector2d &b) {
-        return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
-    });
+    std::sort(suspects.begin(), suspects.end(),
+              [](const Vector2d &a, const Vector2d &b) { return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y(); });
     return suspects;
 }
 

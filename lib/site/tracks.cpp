@@ -386,8 +386,10 @@ std::vector<Track> settle_tracks(const std::vector<View> &views, const std::vect
     for (Track track : tracks)
         if (settler.settle(&track)) settled.push_back(std::move(track));
     doubt_lonely(options.lonely_share * settler.diagonal, &settled);
-    if (counts)
-        for (const auto &[name, n] : settler.drops) (*counts)[name] = n;
+    if (!counts) return settled;
+    for (const auto &[name, n] : settler.drops) (*counts)[name] = n;
+    const auto is_doubtful = [](const Track &track) { return track.is_doubtful; };
+    (*counts)["tracks_doubtful"] = static_cast<double>(std::count_if(settled.begin(), settled.end(), is_doubtful));
     return settled;
 }
 

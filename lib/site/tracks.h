@@ -37,7 +37,7 @@ struct TrackOptions {
     // Of the residuals of a track over what it has to spare (2 n - 3), on top of the same: two sightings always meet
     // halfway, so half of what they miss each other by is seen in each. 0: no such gate.
     double max_unit_px = 1.1;
-    double ground_height_m = 0;       // t_h: lower points are ground; 0: height_share of the mean camera height
+    double ground_height_m = 0; // t_h: lower points are ground; 0: height_share of the mean camera height
     double height_share = 0.006;
     // A point within so many sigma_Z of Z = 0 is ground as well, unless it is higher than max_ground_height_share of
     // the mean camera height: where its matches call it ground, and where they call it obstacle.

@@ -208,7 +208,9 @@ TEST(Neighbours, are_those_that_a_search_of_all_pairs_finds)
         EXPECT_EQ(has_neighbour(points, reach), has) << reach;
         for (std::size_t k = 0; k < found.size(); ++k) {
             EXPECT_LT(found[k].a, found[k].b);
-            if (k > 0) { EXPECT_LE(found[k - 1].distance, found[k].distance); }
+            if (k > 0) {
+                EXPECT_LE(found[k - 1].distance, found[k].distance);
+            }
         }
     }
 }
@@ -266,6 +268,7 @@ TEST(ClusterPoints, joins_the_halves_of_a_torn_body_but_lets_no_stray_point_in)
     std::vector<SitePoint> points;
     for (const double x : {0.0, 0.1, 0.2, 0.3, 0.6}) points.push_back(at(x, 0, 0.2));
     for (const double x : {1.04, 1.14, 1.24, 1.34, 1.44}) points.push_back(at(x, 0, 0.2));
+    for (SitePoint &p : points) p.n_views = 3;
     points.push_back(at(1.92, 0, 0.2));
     const Clusters joined = cluster_points(points, 14);
     EXPECT_NEAR(joined.t_m_m, std::sqrt(0.3 * 0.44), 1e-9);
