@@ -236,6 +236,15 @@ bool footprint_contains(const Obstacle &box, double x, double y, double grow_m)
            std::abs(across.dot(off)) <= box.obb_size.y() / 2 + grow_m;
 }
 
+double distance_outside(const Obstacle &box, double x, double y)
+{
+    const Vector2d along = direction(box.yaw_rad), across(-along.y(), along.x());
+    const Vector2d off(x - box.obb_centre.x(), y - box.obb_centre.y());
+    const double beyond_x = std::abs(along.dot(off)) - box.obb_size.x() / 2;
+    const double beyond_y = std::abs(across.dot(off)) - box.obb_size.y() / 2;
+    return std::max({0.0, beyond_x, beyond_y});
+}
+
 double aabb_iou(const Vector3d &min_a, const Vector3d &max_a, const Vector3d &min_b, const Vector3d &max_b)
 {
     const Vector3d both = (max_a.cwiseMin(max_b) - min_a.cwiseMax(min_b)).cwiseMax(0.0);

@@ -14,7 +14,7 @@ namespace outcrop {
 struct BoxOptions {
     // A point seen by two views only has no say in the box when its second nearest neighbour in the cluster is farther
     // than this many times the median of such distances; in clusters of at least min_isolation_points. 0: all have.
-    double isolation = 3.0;
+    double isolation = 2.7;
     int min_isolation_points = 8;
     double trim_share = 0.02;  // of the points may lie outside at each end ...
     double trim_gap = 0.4;     // ... but only while each widens the extent of the rest by more than this share
@@ -55,6 +55,9 @@ double largest_side(const Obstacle &box); // height included
 
 // Is a ground point inside the oriented footprint grown by `grow_m`?
 bool footprint_contains(const Obstacle &box, double x, double y, double grow_m = 0);
+
+// By how much the oriented footprint has to grow to hold a ground point; 0 inside.
+double distance_outside(const Obstacle &box, double x, double y);
 
 // Intersection over union of axis-aligned boxes.
 double aabb_iou(const Eigen::Vector3d &min_a, const Eigen::Vector3d &max_a, const Eigen::Vector3d &min_b,

@@ -4,32 +4,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <map>
 #include <stdexcept>
 
-#include <nanoflann.hpp>
-
 #include "site/components.h"
+#include "site/neighbours.h"
 
 namespace outcrop {
 
 namespace {
 
 using Eigen::Vector3d;
-
-struct Cloud {
-    const std::vector<Vector3d> &points;
-    std::size_t kdtree_get_point_count() const { return points.size(); }
-    double kdtree_get_pt(std::size_t i, std::size_t axis) const { return points[i][static_cast<int>(axis)]; }
-    template <typename Box>
-    bool kdtree_get_bbox(Box &) const
-    {
-        return false;
-    }
-};
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Cloud>, Cloud, 3, std::uint32_t>;
 
 std::vector<int> labels_of(DisjointSets *sets, std::size_t n)
 {
@@ -40,28 +26,6 @@ std::vector<int> labels_of(DisjointSets *sets, std::size_t n)
         label[i] = number.emplace(root, static_cast<int>(number.size())).first->second;
     }
     return label;
-}
-
-// Two points are joined when is_near says so; looked for within `reach`.
-template <typename IsNear>
-std::vector<int> link(const std::vector<Vector3d> &points, double reach, const IsNear &is_near)
-{
-    DisjointSets sets(points.size());
-    if (points.empty()) return {};
-    const Cloud cloud{points};
-    Tree tree(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(10));
-    tree.buildIndex();
-    // The search radius is squared and open; a little more finds those exactly at the limit, is_near decides.
-    const double radius = reach * reach * (1 + 1e-9) + std::numeric_limits<double>::min();
-    nanoflann::SearchParams unsorted;
-    unsorted.sorted = false;
-    std::vector<std::pair<std::uint32_t, double>> found;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        tree.radiusSearch(points[i].data(), radius, found, unsorted);
-        for (const auto &[j, square] : found)
-            if (j > i && is_near(i, j, std::sqrt(square))) sets.join(static_cast<int>(i), static_cast<int>(j));
-    }
-    return labels_of(&sets, points.size());
 }
 
 std::vector<Vector3d> flattened(const std::vector<SitePoint> &points, double z_weight)
@@ -86,38 +50,30 @@ void ClusterOptions::check() const
     if (!(z_weight > 0) || !(z_weight <= 1) || min_suspected < 1 || min_points < min_suspected)
         throw std::invalid_argument("cluster: z_weight in (0, 1], 1 <= min_suspected <= min_points");
     if (!(group_reach >= 0)) throw std::invalid_argument("cluster: group_reach must be >= 0");
+    if (!(stray_reach >= 0) || min_company < 0)
+        throw std::invalid_argument("cluster: stray_reach and min_company must be >= 0");
     if (!(covariance_sigmas >= 0)) throw std::invalid_argument("cluster: covariance_sigmas must be >= 0");
 }
 
 std::vector<int> single_linkage(const std::vector<Vector3d> &points, double t_m)
 {
     if (!(t_m >= 0)) throw std::invalid_argument("cluster: t_M must be >= 0");
-    return link(points, t_m, [t_m](std::size_t, std::size_t, double d) { return d <= t_m; });
+    DisjointSets sets(points.size());
+    for (const Neighbours &n : neighbours_within(points, t_m)) sets.join(n.a, n.b);
+    return labels_of(&sets, points.size());
 }
 
-// Prim's algorithm on the full graph.
-std::vector<double> spanning_edges(const std::vector<Vector3d> &points)
+// Kruskal's algorithm: the pairs within reach hold every edge of the full tree that is not longer.
+std::vector<double> spanning_edges(const std::vector<Vector3d> &points, double reach)
 {
+    DisjointSets sets(points.size());
     std::vector<double> edges;
-    if (points.size() < 2) return edges;
-    std::vector<double> nearest(points.size(), std::numeric_limits<double>::infinity());
-    std::vector<char> is_in(points.size(), 0);
-    std::size_t last = 0;
-    is_in[0] = 1;
-    while (edges.size() + 1 < points.size()) {
-        std::size_t next = 0;
-        double least = std::numeric_limits<double>::infinity();
-        for (std::size_t i = 0; i < points.size(); ++i) {
-            if (is_in[i]) continue;
-            nearest[i] = std::min(nearest[i], (points[i] - points[last]).norm());
-            if (nearest[i] < least) least = nearest[i], next = i;
-        }
-        if (!std::isfinite(least)) break;
-        is_in[next] = 1;
-        edges.push_back(least);
-        last = next;
+    for (const Neighbours &n : neighbours_within(points, reach)) {
+        if (sets.root(n.a) == sets.root(n.b)) continue;
+        sets.join(n.a, n.b);
+        edges.push_back(n.distance);
     }
-    std::sort(edges.begin(), edges.end());
+    if (points.size() > 1) edges.resize(points.size() - 1, std::numeric_limits<double>::infinity());
     return edges;
 }
 
@@ -138,32 +94,89 @@ double automatic_threshold(const std::vector<double> &edges, double lowest, doub
 
 namespace {
 
-// Least distance between two groups.
-double distance_between(const std::vector<Vector3d> &points, const std::vector<int> &a, const std::vector<int> &b)
+// Points of two views, or in doubt, that stand alone: they belong to what they are nearest to, but do not make one
+// body of two. An accident of matching lies anywhere, also half way.
+std::vector<char> find_strays(const std::vector<Vector3d> &flat, const std::vector<SitePoint> &points, double t_m,
+                              const ClusterOptions &options)
 {
-    double least = std::numeric_limits<double>::infinity();
-    for (const int i : a) {
-        for (const int j : b)
-            least = std::min(least, (points[static_cast<std::size_t>(i)] - points[static_cast<std::size_t>(j)]).norm());
+    std::vector<int> company(points.size(), 0);
+    for (const Neighbours &n : neighbours_within(flat, options.stray_reach * t_m)) {
+        ++company[static_cast<std::size_t>(n.a)];
+        ++company[static_cast<std::size_t>(n.b)];
     }
-    return least;
+    std::vector<char> is_stray(points.size(), 0);
+    for (std::size_t i = 0; i < points.size(); ++i)
+        is_stray[i] = (points[i].n_views <= 2 || points[i].is_doubtful) && company[i] < options.min_company;
+    return is_stray;
 }
 
-// Groups nearer than reach become one, the nearest pair first reached in order; members stay ascending.
-void join_groups(const std::vector<Vector3d> &points, double reach, std::vector<std::vector<int>> *groups)
+class Linker {
+public:
+    Linker(const std::vector<Vector3d> &flat, const std::vector<SitePoint> &points, double t_m,
+           const ClusterOptions &options)
+        : flat_(flat), points_(points), t_m_(t_m), options_(options), sets_(points.size()),
+          is_stray_(find_strays(flat, points, t_m, options)), has_body_(points.size())
+    {
+        for (std::size_t i = 0; i < points.size(); ++i) has_body_[i] = !is_stray_[i];
+    }
+
+    std::vector<int> link()
+    {
+        // Shortest steps first: a stray goes to the nearer of two bodies.
+        const double reach = options_.covariance_sigmas > 0 ? 2 * t_m_ : t_m_;
+        for (const Neighbours &n : neighbours_within(flat_, reach))
+            if (is_near(n)) join(n);
+        return labels_of(&sets_, points_.size());
+    }
+
+private:
+    bool is_near(const Neighbours &n) const
+    {
+        const double sum = std::hypot(spread(points_[at(n.a)]), spread(points_[at(n.b)]));
+        return std::max(n.distance - options_.covariance_sigmas * sum, 0.5 * n.distance) <= t_m_;
+    }
+
+    void join(const Neighbours &n)
+    {
+        const std::size_t a = at(sets_.root(n.a)), b = at(sets_.root(n.b));
+        const bool is_bridge = is_stray_[at(n.a)] || is_stray_[at(n.b)];
+        if (a == b || (is_bridge && has_body_[a] && has_body_[b])) return;
+        const char has_body = has_body_[a] || has_body_[b];
+        has_body_[at(sets_.join(n.a, n.b))] = has_body;
+    }
+
+    static std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+    const std::vector<Vector3d> &flat_;
+    const std::vector<SitePoint> &points_;
+    double t_m_;
+    const ClusterOptions &options_;
+    DisjointSets sets_;
+    std::vector<char> is_stray_, has_body_;
+};
+
+// Groups with points not farther apart than reach become one; strays do not count. In the order of the first of each.
+void join_groups(const std::vector<Vector3d> &flat, const std::vector<char> &is_stray, double reach,
+                 std::vector<std::vector<int>> *groups)
 {
-    for (std::size_t a = 0; a < groups->size(); ++a) {
-        for (std::size_t b = a + 1; b < groups->size();) {
-            if (distance_between(points, (*groups)[a], (*groups)[b]) > reach) {
-                ++b;
-                continue;
-            }
-            auto &joined = (*groups)[a];
-            joined.insert(joined.end(), (*groups)[b].begin(), (*groups)[b].end());
-            std::sort(joined.begin(), joined.end());
-            groups->erase(groups->begin() + static_cast<std::ptrdiff_t>(b));
-            b = a + 1; // the larger group may reach farther
-        }
+    std::vector<int> group_of(flat.size(), -1);
+    for (std::size_t g = 0; g < groups->size(); ++g)
+        for (const int i : (*groups)[g])
+            if (!is_stray[static_cast<std::size_t>(i)]) group_of[static_cast<std::size_t>(i)] = static_cast<int>(g);
+    DisjointSets sets(groups->size());
+    for (const Neighbours &n : neighbours_within(flat, reach)) {
+        const int a = group_of[static_cast<std::size_t>(n.a)], b = group_of[static_cast<std::size_t>(n.b)];
+        if (a >= 0 && b >= 0) sets.join(a, b);
+    }
+    std::map<int, std::vector<int>> joined; // roots are least members: the order stays
+    for (std::size_t g = 0; g < groups->size(); ++g) {
+        std::vector<int> &members = joined[sets.root(static_cast<int>(g))];
+        members.insert(members.end(), (*groups)[g].begin(), (*groups)[g].end());
+    }
+    groups->clear();
+    for (auto &[root, members] : joined) {
+        std::sort(members.begin(), members.end());
+        groups->push_back(std::move(members));
     }
 }
 
@@ -174,15 +187,12 @@ Clusters cluster_points(const std::vector<SitePoint> &points, double diagonal_m,
     options.check();
     Clusters clusters;
     const std::vector<Vector3d> flat = flattened(points, options.z_weight);
+    const double highest = options.max_t_m_share * diagonal_m;
     clusters.t_m_m = options.t_m_m > 0 ? options.t_m_m
-                                       : automatic_threshold(spanning_edges(flat), options.min_t_m_share * diagonal_m,
-                                                             options.max_t_m_share * diagonal_m);
+                                       : automatic_threshold(spanning_edges(flat, highest),
+                                                             options.min_t_m_share * diagonal_m, highest);
     const double t_m = clusters.t_m_m;
-    const double reach = options.covariance_sigmas > 0 ? 2 * t_m : t_m;
-    const std::vector<int> label = link(flat, reach, [&](std::size_t i, std::size_t j, double d) {
-        const double shrink = options.covariance_sigmas * std::hypot(spread(points[i]), spread(points[j]));
-        return std::max(d - shrink, 0.5 * d) <= t_m;
-    });
+    const std::vector<int> label = Linker(flat, points, t_m, options).link();
     std::vector<std::vector<int>> members;
     for (std::size_t i = 0; i < label.size(); ++i) {
         if (label[i] >= static_cast<int>(members.size())) members.emplace_back();
@@ -194,7 +204,8 @@ Clusters cluster_points(const std::vector<SitePoint> &points, double diagonal_m,
             (n >= options.min_points ? clusters.groups : clusters.suspected).push_back(group);
     }
     if (options.t_m_m == 0)
-        join_groups(flat, std::min(options.group_reach * t_m, options.max_t_m_share * diagonal_m), &clusters.groups);
+        join_groups(flat, find_strays(flat, points, t_m, options), std::min(options.group_reach * t_m, highest),
+                    &clusters.groups);
     clusters.label.assign(points.size(), -1);
     for (const std::vector<int> &group : clusters.suspected)
         for (const int i : group) clusters.label[static_cast<std::size_t>(i)] = -2;

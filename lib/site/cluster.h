@@ -14,11 +14,15 @@ struct ClusterOptions {
     double t_m_m = 0;            // thesis t_M, metres; 0: from the gap in the edges of the minimum spanning tree
     double min_t_m_share = 0.02; // bounds of the automatic t_M, shares of the area's diagonal
     double max_t_m_share = 0.06;
-    double z_weight = 0.35;       // obstacles stand on the ground: a step up counts less than one sideways; 1: thesis
-    double group_reach = 1.5;     // whole groups nearer than this many automatic t_M are one (a sparse body may be torn
-                                  // where a stray point must not be let in); still under max_t_m_share
-    int min_points = 5;           // fewer: suspected
-    int min_suspected = 2;        // fewer: noise
+    double z_weight = 0.35;   // obstacles stand on the ground: a step up counts less than one sideways; 1: thesis
+    double group_reach = 1.5; // whole groups nearer than this many automatic t_M are one (a sparse body may be torn
+                              // where a stray point must not be let in); still under max_t_m_share
+    int min_points = 5;       // fewer: suspected
+    int min_suspected = 2;    // fewer: noise
+    // A point that two views only agree on, or one in doubt, is a stray when fewer than min_company others are within
+    // stray_reach of t_M. Strays join the nearest body but never two bodies. min_company 0: thesis, all points alike.
+    double stray_reach = 0.5;
+    int min_company = 2;
     double covariance_sigmas = 0; // distances shrink by so many sigmas of the two points, but not below half; 0: thesis
     void check() const;           // throws std::invalid_argument
 };
@@ -34,8 +38,9 @@ struct Clusters {
 // of first appearance. Union-find over radius search, O(n log n) for bounded density.
 std::vector<int> single_linkage(const std::vector<Eigen::Vector3d> &points, double t_m);
 
-// Lengths of the edges of the Euclidean minimum spanning tree, ascending. O(n^2).
-std::vector<double> spanning_edges(const std::vector<Eigen::Vector3d> &points);
+// Lengths of the edges of the Euclidean minimum spanning tree, ascending; those above reach are told as infinite.
+// O(n log n + pairs within reach).
+std::vector<double> spanning_edges(const std::vector<Eigen::Vector3d> &points, double reach);
 
 // t_M: the middle of the widest relative gap between ascending edge lengths inside [lowest, highest], or highest
 // when there is no clear one.

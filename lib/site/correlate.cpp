@@ -133,9 +133,8 @@ std::vector<float> window_weights(const CorrelateOptions &options)
     return weights;
 }
 
-// Weights of the window outside the wedge between two branches set to 0.
-void cut_wedge(double angle_a, double angle_b, const CorrelateOptions &options, const std::vector<float> &weights,
-               Window *out)
+// Weights of a grid of samples, `side` squared and `step` pixels apart, outside the wedge between two branches set to 0.
+void cut_wedge(double angle_a, double angle_b, int side, float step, const float weights[], float out[])
 {
     auto ax = static_cast<float>(std::cos(angle_a));
     auto ay = static_cast<float>(std::sin(angle_a));
@@ -145,14 +144,14 @@ void cut_wedge(double angle_a, double angle_b, const CorrelateOptions &options, 
         std::swap(ax, bx);
         std::swap(ay, by);
     }
-    const int r = options.window_px / 2;
+    const int r = side / 2;
     std::size_t i = 0;
     for (int y = -r; y <= r; y++) {
         for (int x = -r; x <= r; x++, i++) {
-            const auto px = static_cast<float>(x);
-            const auto py = static_cast<float>(y);
+            const float px = static_cast<float>(x) * step;
+            const float py = static_cast<float>(y) * step;
             const bool inside = ax * py - ay * px >= -kWedgeSlackPx && px * by - py * bx >= -kWedgeSlackPx;
-            (*out)[i] = inside ? weights[i] : 0.0F;
+            out[i] = inside ? weights[i] : 0.0F;
         }
     }
 }
@@ -390,9 +389,15 @@ double Correlator::coarse_score(int left, const Hypothesis &hypothesis) const
     std::array<float, PreparedView::kCoarse> samples;
     warp(right_, hypothesis.H.data(), l.x_px, l.y_px, PreparedView::kCoarseSide, coarse_step(options_.window_px),
          samples.data());
-    const double min_weight = options_.min_known * PreparedView::kCoarse;
-    return vnc(left_.coarse_patch(left), samples.data(), ones.data(), PreparedView::kCoarse, min_weight, 0)
-        .value_or(-1);
+    const float *weight = ones.data();
+    std::array<float, PreparedView::kCoarse> cut;
+    if (options_.support == Support::kWedge && hypothesis.left_branch[0] >= 0) {
+        cut_wedge(l.branch[hypothesis.left_branch[0]].angle_rad, l.branch[hypothesis.left_branch[1]].angle_rad,
+                  PreparedView::kCoarseSide, coarse_step(options_.window_px), ones.data(), cut.data());
+        weight = cut.data();
+    }
+    const double min_weight = options_.min_known * total_of(weight, PreparedView::kCoarse);
+    return vnc(left_.coarse_patch(left), samples.data(), weight, PreparedView::kCoarse, min_weight, 0).value_or(-1);
 }
 
 double Correlator::full_score(int left, int right, const Hypothesis &hypothesis, double to_beat) const
@@ -407,7 +412,7 @@ double Correlator::full_score(int left, int right, const Hypothesis &hypothesis,
     const float *weight = weights_.data();
     if (is_wedge) {
         cut_wedge(l.branch[hypothesis.left_branch[0]].angle_rad, l.branch[hypothesis.left_branch[1]].angle_rad,
-                  options_, weights_, &cut);
+                  options_.window_px, 1, weights_.data(), cut.data());
         weight = cut.data();
     }
     warp(right_, hypothesis.H.data(), l.x_px, l.y_px, options_.window_px, 1, samples.data());
@@ -417,7 +422,7 @@ double Correlator::full_score(int left, int right, const Hypothesis &hypothesis,
 
     if (is_wedge) {
         cut_wedge(r.branch[hypothesis.right_branch[0]].angle_rad, r.branch[hypothesis.right_branch[1]].angle_rad,
-                  options_, weights_, &cut);
+                  options_.window_px, 1, weights_.data(), cut.data());
     }
     warp(left_, hypothesis.H_back.data(), r.x_px, r.y_px, options_.window_px, 1, samples.data());
     const std::optional<double> back = measure(options_.measure, right_.patch(right), samples.data(), weight, n,
@@ -450,7 +455,7 @@ std::optional<Correlation> Correlator::correlate(int left, int right, const Eige
     if (options_.with_extra_planes) add_extra_planes(left, right, point, &hypotheses);
 
     // Two levels: a sparse sample of every plane, the full window for the best of them.
-    const bool is_sampled = options_.measure == Measure::kVnc && options_.support == Support::kWindow;
+    const bool is_sampled = options_.measure == Measure::kVnc;
     if (is_sampled) {
         for (Hypothesis &h : hypotheses) h.coarse = coarse_score(left, h);
         std::stable_sort(hypotheses.begin(), hypotheses.end(),

@@ -85,6 +85,18 @@ json boxes_json(const std::vector<Obstacle> &obstacles)
     return out;
 }
 
+json quality_json(const std::vector<Statement> &quality)
+{
+    json out = json::array();
+    for (const Statement &s : quality) {
+        const char *severity = s.severity == Severity::kFault     ? "fault"
+                               : s.severity == Severity::kWarning ? "warning"
+                                                                  : "note";
+        out.push_back({{"code", s.code}, {"text", s.text}, {"severity", severity}});
+    }
+    return out;
+}
+
 json camera_json(const RefinedView &view)
 {
     const oc_intrinsics_t &k = view.camera.k;
@@ -182,9 +194,10 @@ void write_model_dir(const std::string &dir, const SiteModel &model, const std::
 {
     // All texts first: a fault in one leaves the folder as it was.
     const std::string matches = text_of(dir + "/matches.json", matches_json(model, views));
-    const std::string obstacles = text_of(
-        dir + "/model/obstacles.json",
-        {{"units", "m"}, {"obstacles", boxes_json(model.obstacles)}, {"suspected", boxes_json(model.suspected)}});
+    const std::string obstacles = text_of(dir + "/model/obstacles.json", {{"units", "m"},
+                                                                          {"obstacles", boxes_json(model.obstacles)},
+                                                                          {"suspected", boxes_json(model.suspected)},
+                                                                          {"quality", quality_json(model.quality)}});
     const std::string cameras = text_of(dir + "/model/cameras.json", cameras_json(model));
     const std::string points = points_ply(model.points);
     std::filesystem::create_directories(dir + "/model");

@@ -8,6 +8,7 @@
 
 #include "site/box_shadow.h"
 #include "site/boxes.h"
+#include "site/quality.h"
 #include "site/triangulate.h"
 
 namespace outcrop {
@@ -46,6 +47,7 @@ public:
     {
         paint_free();
         paint_points();
+        paint_suspects();
         paint_boxes(model_.suspected, true);
         paint_boxes(model_.obstacles, true);
         paint_boxes(model_.obstacles, false);
@@ -78,13 +80,14 @@ private:
 
     void paint_free()
     {
+        const GroundCode is_free = has_fault(model_) ? GroundCode::kSuspected : GroundCode::kFree;
         for (int row = 0; row < map_.codes.rows; ++row) {
             for (int col = 0; col < map_.codes.cols; ++col) {
                 const Vector3d ground = cell_centre(row, col);
                 int n_seen = 0;
                 for (std::size_t e = 0; e < eyes_.size() && n_seen < options_.min_views; ++e)
                     n_seen += sees(eyes_[e], ground) && !is_hidden(blockers_, eyes_[e].centre, ground);
-                if (n_seen >= options_.min_views) set(row, col, GroundCode::kFree);
+                if (n_seen >= options_.min_views) set(row, col, is_free);
             }
         }
     }
@@ -129,18 +132,60 @@ private:
         }
     }
 
+    void paint_suspects()
+    {
+        const double reach = options_.suspect_cells * map_.metres_per_pixel + options_.pose_sigmas * pose_sigma_;
+        for (const Vector2d &at : model_.suspects)
+            around(at.x(), at.y(), reach, [&](int row, int col, const Vector3d &cell) {
+                if ((cell.head<2>() - at).norm() <= reach) set(row, col, GroundCode::kSuspected);
+            });
+    }
+
+    // The least footprint of the same yaw that holds the box and the suspect places beside it.
+    Obstacle with_suspects(const Obstacle &box) const
+    {
+        const double farthest = options_.ring_reach * box.obb_size.head<2>().norm();
+        const Vector2d along(std::cos(box.yaw_rad), std::sin(box.yaw_rad)), across(-along.y(), along.x());
+        Vector2d high = box.obb_size.head<2>() / 2, low = -high;
+        for (const Vector2d &at : model_.suspects) {
+            if (distance_outside(box, at.x(), at.y()) > farthest) continue;
+            const Vector2d off = at - box.obb_centre.head<2>(), own(along.dot(off), across.dot(off));
+            low = low.cwiseMin(own), high = high.cwiseMax(own);
+        }
+        Obstacle grown = box;
+        const Vector2d middle = (low + high) / 2;
+        grown.obb_centre.head<2>() += middle.x() * along + middle.y() * across;
+        grown.obb_size.head<2>() = high - low;
+        return grown;
+    }
+
+    // The fewer points a box has, the farther the body may go on beyond them.
+    double ring_share(const Obstacle &box) const
+    {
+        const double sampled = options_.ring_sampling / std::sqrt(static_cast<double>(std::max(box.n_points, 1)));
+        return std::clamp(sampled, options_.ring_share, std::max(options_.ring_share, options_.max_ring_share));
+    }
+
+    void paint_footprint(const Obstacle &box, double grow, GroundCode code)
+    {
+        around(box.obb_centre.x(), box.obb_centre.y(), box.obb_size.head<2>().norm() / 2 + 2 * grow,
+               [&](int row, int col, const Vector3d &cell) {
+                   if (footprint_contains(box, cell.x(), cell.y(), grow)) set(row, col, code);
+               });
+    }
+
     void paint_boxes(const std::vector<Obstacle> &boxes, bool is_ring)
     {
+        // Half a cell's diagonal, so that no cell that the box touches stays free.
+        const double half_cell = map_.metres_per_pixel * std::sqrt(0.5);
+        const double doubt = half_cell + options_.pose_sigmas * pose_sigma_;
         for (const Obstacle &box : boxes) {
-            const double diagonal = box.obb_size.head<2>().norm();
-            // Half a cell's diagonal, so that no cell that the box touches stays free.
-            const double ring = options_.ring_share * diagonal + options_.pose_sigmas * pose_sigma_;
-            const double grow = map_.metres_per_pixel * std::sqrt(0.5) + (is_ring ? ring : 0);
-            around(box.obb_centre.x(), box.obb_centre.y(), diagonal / 2 + 2 * grow,
-                   [&](int row, int col, const Vector3d &cell) {
-                       if (footprint_contains(box, cell.x(), cell.y(), grow))
-                           set(row, col, is_ring ? GroundCode::kSuspected : GroundCode::kObstacle);
-                   });
+            if (!is_ring) {
+                paint_footprint(box, half_cell, GroundCode::kObstacle);
+                continue;
+            }
+            paint_footprint(box, doubt + ring_share(box) * box.obb_size.head<2>().norm(), GroundCode::kSuspected);
+            paint_footprint(with_suspects(box), doubt, GroundCode::kSuspected);
         }
     }
 
@@ -157,7 +202,7 @@ private:
 void GroundMapOptions::check() const
 {
     if (!(cell_m >= 0) || min_views < 1 || !(ring_share >= 0) || !(pose_sigmas >= 0) || !(point_sigmas >= 0) ||
-        !(min_point_cells >= 0))
+        !(min_point_cells >= 0) || !(suspect_cells >= 0) || !(ring_reach >= 0))
         throw std::invalid_argument(
             "ground map: cell_m, ring_share, pose_sigmas and point limits must be >= 0, min_views >= 1");
     if (border_px < 0 || max_cells_per_side < 1)

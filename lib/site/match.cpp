@@ -175,6 +175,7 @@ MatchOptions thesis_match_options()
     MatchOptions options;
     options.strip.method = StripMethod::kThesis;
     options.strip.with_rivals = false;
+    options.correlate.support = Support::kWindow;
     options.correlate.with_extra_planes = false;
     options.correlate.smooth_sigma_px = 0;
     options.correlate.gauss_sigma_px = 0;

@@ -11,9 +11,17 @@
 
 namespace outcrop {
 
+// The wedge: what lies beside a corner is another plane in the other view.
+inline CorrelateOptions wedge_correlation()
+{
+    CorrelateOptions options;
+    options.support = Support::kWedge;
+    return options;
+}
+
 struct MatchOptions {
     StripOptions strip;
-    CorrelateOptions correlate;
+    CorrelateOptions correlate = wedge_correlation();
     double min_score = 0.80;
     double min_margin = 0.05;          // to the runner-up at another place, seen from either view
     double same_place_px = 3;          // nearer junctions are one place
@@ -24,7 +32,7 @@ struct MatchOptions {
     bool with_pose_covariance = false; // of the point: poses' margins too, not the pixels' noise only
 };
 
-// As the thesis has it: its strip, VNC over .75, no margin, no extra planes.
+// As the thesis has it: its strip, VNC over .75 in the square, no margin, no extra planes.
 // Anchored; set correlate.warp to kUnanchored for the letter of Eq 5.34.
 MatchOptions thesis_match_options();
 

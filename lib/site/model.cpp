@@ -77,6 +77,22 @@ bool sees_ground(const View &view, const Vector3d &ground, double reach)
     return x >= 0 && y >= 0 && x <= view.camera.k.width_px - 1.0 && y <= view.camera.k.height_px - 1.0;
 }
 
+// Do two views see one point of a coarse grid over the area?
+bool sees_common_ground(const std::vector<View> &views, const Area &area, double reach)
+{
+    constexpr int kCells = 32;
+    for (int row = 0; row < kCells; ++row) {
+        for (int col = 0; col < kCells; ++col) {
+            const Vector3d ground(area.x_min + (col + 0.5) / kCells * (area.x_max - area.x_min),
+                                  area.y_min + (row + 0.5) / kCells * (area.y_max - area.y_min), 0);
+            int n_seen = 0;
+            for (const View &view : views) n_seen += sees_ground(view, ground, reach);
+            if (n_seen >= 2) return true;
+        }
+    }
+    return false;
+}
+
 bool is_exact(const View &view, double exact_sigma)
 {
     for (const double half_width : view.margin.v)
@@ -92,6 +108,8 @@ void BuildOptions::check() const
     refine.check();
     cluster.check();
     boxes.check();
+    suspects.check();
+    quality.check();
     if (passes < 1 || passes > 10) throw std::invalid_argument("model: passes must be 1..10");
     if (!(area_z_share > 0) || !(area_reach > 0)) throw std::invalid_argument("model: area shares must be > 0");
 }
@@ -165,7 +183,9 @@ public:
             keep_matches();
             make_points();
             group();
+            look_for_suspects();
         }
+        judge_all();
         return std::move(model_);
     }
 
@@ -210,7 +230,10 @@ private:
     void refine()
     {
         settle();
-        refine_on(tracks_);
+        std::vector<Track> sure;
+        for (const Track &track : tracks_)
+            if (!track.is_doubtful) sure.push_back(track);
+        refine_on(sure);
     }
 
     // From the reported poses anew, with all there is: the vehicle's ties and these tracks.
@@ -222,6 +245,8 @@ private:
         model_.views = result.views;
         covariances_ = std::move(result.relative_covariances);
         margins_ = std::move(result.matching_margins);
+        n_ground_sightings_ = result.n_ground_sightings;
+        n_ground_misfits_ = result.n_ground_rejected;
         for (std::size_t i = 0; i < views_.size(); ++i) cameras_[i] = model_.views[i].camera;
         model_.counts["refine_ground"] = result.n_ground;
         model_.counts["refine_points"] = result.n_points;
@@ -237,14 +262,16 @@ private:
                                 model_.area, options_.tracks, &model_.counts);
     }
 
-    // Matches that no settled track holds are left out; the others take its point.
+    // Matches that no sure track holds are left out; the others take its point.
     void keep_matches()
     {
         std::map<int, int> index;
         for (std::size_t i = 0; i < views_.size(); ++i) index[views_[i].id] = static_cast<int>(i);
         std::map<TrackPixel, const Track *> track_of;
-        for (const Track &track : tracks_)
+        for (const Track &track : tracks_) {
+            if (track.is_doubtful) continue;
             for (const TrackPixel &p : track.pixels) track_of[p] = &track;
+        }
         double n_matches = 0;
         for (PairMatches &pair : model_.pairs) {
             std::vector<Match> kept;
@@ -300,6 +327,7 @@ private:
             point.covariance = track.fit.covariance;
             point.n_views = static_cast<int>(track.pixels.size());
             point.score = track.score;
+            point.is_doubtful = track.is_doubtful;
             point.colour = colour_of(track);
             model_.points.push_back(point);
         }
@@ -317,15 +345,36 @@ private:
         model_.counts["suspected"] = static_cast<double>(model_.suspected.size());
     }
 
+    void look_for_suspects()
+    {
+        std::set<std::pair<int, int>> matched;
+        for (const Track &track : tracks_)
+            for (const TrackPixel &p : track.pixels) matched.insert({p.view, p.junction});
+        model_.suspects = find_suspects(views_, matched, model_, options_.suspects);
+        model_.counts["suspect_places"] = static_cast<double>(model_.suspects.size());
+    }
+
+    void judge_all()
+    {
+        QualityFacts facts;
+        facts.views = &views_;
+        facts.is_exact = is_exact_;
+        facts.sees_common_ground = sees_common_ground(views_, model_.area, options_.area_reach);
+        facts.n_ground_sightings = n_ground_sightings_;
+        facts.n_ground_misfits = n_ground_misfits_;
+        judge(facts, options_.quality, &model_);
+    }
+
     std::vector<View> views_;
     const BuildOptions &options_;
     SiteModel model_;
     double diagonal_ = 0;
     bool is_exact_ = true;
-    bool is_refined_ = false;           // cameras_ and margins_ come from refine_poses
-    std::vector<oc_camera_t> cameras_;  // as believed now
-    std::vector<oc_margin_t> margins_;  // for matching
-    std::vector<Matrix6d> covariances_; // of the poses, between views
+    int n_ground_sightings_ = 0, n_ground_misfits_ = 0; // of the last refinement
+    bool is_refined_ = false;                           // cameras_ and margins_ come from refine_poses
+    std::vector<oc_camera_t> cameras_;                  // as believed now
+    std::vector<oc_margin_t> margins_;                  // for matching
+    std::vector<Matrix6d> covariances_;                 // of the poses, between views
     std::vector<Track> merged_, tracks_;
 };
 

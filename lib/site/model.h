@@ -10,8 +10,10 @@
 #include "site/cluster.h"
 #include "site/match.h"
 #include "site/pairs.h"
+#include "site/quality.h"
 #include "site/refine.h"
 #include "site/site_model.h"
+#include "site/suspects.h"
 #include "site/tracks.h"
 #include "site/view.h"
 
@@ -27,6 +29,8 @@ struct BuildOptions {
     RefineOptions refine;
     ClusterOptions cluster;
     BoxOptions boxes;
+    SuspectOptions suspects;
+    QualityOptions quality;
     int passes = 2;            // of matching; refinement comes after each but is left out when every pose is exact
     bool ties_first = true;    // refine on the vehicle's ground ties alone before the first pass: narrower strips
     double area_z_share = 1.0; // z_max of a derived area, of the mean camera height
@@ -47,7 +51,7 @@ using Matcher = std::function<std::vector<PairMatches>(const MatchPass &)>;
 // Refinement on the ties -> pairs -> sure matches in the posterior's strips -> tracks -> refinement -> all matches in
 // the new posterior's strips, checked in third views -> tracks -> refinement -> points -> clusters -> boxes. A pure
 // function of the views as a set: they are sorted by id first, sums run in fixed order, one thread. Bit-identical
-// between calls (SiteModel::ms apart). area empty: derive_area. Fewer than two views give a model without points.
+// between calls (SiteModel::ms apart). area empty: derive_area. Fewer than two views give a model without points. Last comes judge() of quality.h.
 // Throws std::invalid_argument for options out of range, ids that appear twice and cameras or margins that are not
 // valid.
 SiteModel build_site(const std::vector<View> &views, const std::optional<Area> &area, const BuildOptions &options = {});

@@ -222,7 +222,7 @@ public:
     }
 
     bool solve();
-    int reject();
+    int reject(RefineResult *result);
     void fill(RefineResult *result) const;
 
 private:
@@ -393,7 +393,7 @@ double Adjustment::residual_sigmas(const Pixel &pixel, const Vector3d &position,
     return (Vector2d(pixel.x_px, pixel.y_px) - projected).norm() / options_.sigma_px;
 }
 
-int Adjustment::reject()
+int Adjustment::reject(RefineResult *result)
 {
     int n_rejected = 0;
     std::vector<Point> kept;
@@ -404,6 +404,10 @@ int Adjustment::reject()
         const std::size_t before = point.pixels.size();
         point.pixels = good.size() >= 2 ? good : std::vector<Pixel>();
         n_rejected += static_cast<int>(before - point.pixels.size());
+        if (point.is_ground) {
+            result->n_ground_sightings += static_cast<int>(before);
+            result->n_ground_rejected += static_cast<int>(before - point.pixels.size());
+        }
         if (!point.pixels.empty()) kept.push_back(std::move(point));
     }
     points_ = std::move(kept);
@@ -581,7 +585,7 @@ RefineResult refine_poses(const std::vector<View> &views, const std::vector<Trac
     if (options.use_ties) adjustment.add(points_of_ties(views, options.tie_merge_px));
     if (options.use_tracks) adjustment.add(points_of_tracks(views, tracks));
     if (adjustment.solve()) {
-        result.n_rejected = adjustment.reject();
+        result.n_rejected = adjustment.reject(&result);
         if (result.n_rejected > 0) adjustment.solve();
     }
     adjustment.fill(&result);

@@ -35,6 +35,8 @@ struct RefineResult {
     std::vector<oc_margin_t> matching_margins;
     int n_ground = 0, n_points = 0; // tracks in the last solve
     int n_rejected = 0;             // sightings left out
+    int n_ground_sightings = 0;     // of the first solve ...
+    int n_ground_rejected = 0;      // ... and those of them that were left out: a flat ground does not explain them
     // Of the sightings of the last solve, at the sensor's and at the final poses.
     double rms_before_px = 0, rms_after_px = 0;
 };

@@ -47,7 +47,8 @@ struct SitePoint {
     int n_views = 2;
     double score = 0;
     cv::Vec3b colour{200, 200, 200};
-    int obstacle = -1; // index in SiteModel::obstacles, -1: none, -2: suspected
+    bool is_doubtful = false; // a sign that something may stand here, but no match to build on
+    int obstacle = -1;        // index in SiteModel::obstacles, -1: none, -2: suspected
 };
 
 // A bounding box standing on the ground.
@@ -62,12 +63,23 @@ struct Obstacle {
     double voxel_m = 0;        // side of the voxels it was carved in; 0: points only
 };
 
+enum class Severity { kNote, kWarning, kFault };
+
+// What the model says of itself; a fault: nothing in it may be relied on.
+struct Statement {
+    std::string code; // stable, for programs
+    std::string text; // one sentence
+    Severity severity = Severity::kNote;
+};
+
 struct SiteModel {
     std::vector<RefinedView> views; // ascending id
     std::vector<PairMatches> pairs; // ascending (left, right)
     std::vector<SitePoint> points;
     std::vector<Obstacle> obstacles; // is_suspected false
     std::vector<Obstacle> suspected;
+    std::vector<Eigen::Vector2d> suspects; // places on the ground where something low may stand (suspects.h)
+    std::vector<Statement> quality;        // no statement: no reservations
     Area area;
     std::map<std::string, double> counts; // for the report
     std::map<std::string, double> ms;     // time per step; not part of equality

@@ -11,6 +11,7 @@
 #include <Eigen/LU>
 
 #include "site/components.h"
+#include "site/neighbours.h"
 
 namespace outcrop {
 
@@ -129,6 +130,7 @@ void TrackOptions::check() const
     if (!(ground_height_m >= 0) || !(area_slack >= 0) || !(ground_sigmas >= 0) || !(obstacle_sigmas >= 0) ||
         !(max_ground_height_share >= 0))
         throw std::invalid_argument("tracks: heights and slack must be >= 0");
+    if (!(max_unit_px >= 0)) throw std::invalid_argument("tracks: max_unit_px must be >= 0");
 }
 
 std::vector<Track> merge_tracks(const std::vector<View> &views, const std::vector<PairMatches> &pairs,
@@ -256,6 +258,23 @@ struct Settler {
         return best;
     }
 
+    // Do the residuals together fit what the track has to spare?
+    bool is_tight(double sum, std::size_t n) const
+    {
+        if (!(options.max_unit_px > 0)) return true;
+        const double spare = 2.0 * static_cast<double>(n) - 3.0;
+        const double square = sum * options.max_reprojection_px * options.max_reprojection_px / spare;
+        return square <= options.max_unit_px * options.max_unit_px;
+    }
+
+    void drop_worst(const std::vector<Sighting> &all, const Eigen::Vector3d &point, std::vector<std::size_t> *use) const
+    {
+        const auto fits_better = [&](std::size_t a, std::size_t b) {
+            return misfit(all[a], point) < misfit(all[b], point);
+        };
+        use->erase(std::max_element(use->begin(), use->end(), fits_better));
+    }
+
     // Triangulates; when not all sightings fit, those that do not are left out.
     bool fit(Track *track) const
     {
@@ -269,14 +288,35 @@ struct Settler {
             const std::vector<std::size_t> good =
                 result ? fitting(all, result->point, &sum) : std::vector<std::size_t>();
             if (std::includes(good.begin(), good.end(), use.begin(), use.end())) {
-                keep(use, track);
                 track->fit = *result;
+                tighten(all, &use, track);
+                keep(use, track);
                 return true;
             }
             if (all.size() == 2) return false;
             use = round == 0 ? consensus(all) : good;
         }
         return false;
+    }
+
+    // Leaves out the worst sightings until the rest is tight; a track that never is keeps them all and is in doubt.
+    void tighten(const std::vector<Sighting> &all, std::vector<std::size_t> *use, Track *track) const
+    {
+        std::vector<std::size_t> rest = *use;
+        std::optional<Triangulated> result = track->fit;
+        while (result) {
+            double sum = 0;
+            for (const std::size_t i : rest) sum += misfit(all[i], result->point);
+            if (is_tight(sum, rest.size())) {
+                *use = rest;
+                track->fit = *result;
+                return;
+            }
+            if (rest.size() == 2) break;
+            drop_worst(all, result->point, &rest);
+            result = triangulate_of(all, rest);
+        }
+        track->is_doubtful = true;
     }
 
     static void keep(const std::vector<std::size_t> &use, Track *track)
@@ -312,6 +352,23 @@ struct Settler {
 
 } // namespace
 
+namespace {
+
+// What two views alone say of a point that no other point is near to may be an accident.
+void doubt_lonely(double reach, std::vector<Track> *tracks)
+{
+    std::vector<Eigen::Vector3d> points;
+    for (const Track &track : *tracks) points.push_back(track.fit.point);
+    const std::vector<char> has_company = has_neighbour(points, reach);
+    for (std::size_t i = 0; i < tracks->size(); ++i) {
+        Track &track = (*tracks)[i];
+        const bool is_weak = track.kind == MatchKind::kObstacle && track.pixels.size() == 2;
+        track.is_doubtful = track.is_doubtful || (is_weak && !has_company[i]);
+    }
+}
+
+} // namespace
+
 std::vector<Track> settle_tracks(const std::vector<View> &views, const std::vector<oc_camera_t> &cameras,
                                  const std::vector<Matrix6d> &pose_covariances, const std::vector<Track> &tracks,
                                  const Area &area, const TrackOptions &options, std::map<std::string, double> *counts)
@@ -328,8 +385,11 @@ std::vector<Track> settle_tracks(const std::vector<View> &views, const std::vect
     std::vector<Track> settled;
     for (Track track : tracks)
         if (settler.settle(&track)) settled.push_back(std::move(track));
-    if (counts)
-        for (const auto &[name, n] : settler.drops) (*counts)[name] = n;
+    doubt_lonely(options.lonely_share * settler.diagonal, &settled);
+    if (!counts) return settled;
+    for (const auto &[name, n] : settler.drops) (*counts)[name] = n;
+    const auto is_doubtful = [](const Track &track) { return track.is_doubtful; };
+    (*counts)["tracks_doubtful"] = static_cast<double>(std::count_if(settled.begin(), settled.end(), is_doubtful));
     return settled;
 }
 

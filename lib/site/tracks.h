@@ -25,13 +25,19 @@ struct Track {
     MatchKind kind = MatchKind::kObstacle;
     double score = 0; // best of its matches
     Triangulated fit; // valid after settle_tracks
+    // Fits only loosely, or two views alone say so and no other point is near: a sign that something may stand there,
+    // but no match to build on.
+    bool is_doubtful = false;
 };
 
 struct TrackOptions {
     TriangulateOptions triangulate;
     double max_reprojection_px = 2.0; // of a sighting, on top of what the poses' covariance allows
     double chi = 2.58;                // gate on uncertain poses, in sigmas
-    double ground_height_m = 0;       // t_h: lower points are ground; 0: height_share of the mean camera height
+    // Of the residuals of a track over what it has to spare (2 n - 3), on top of the same: two sightings always meet
+    // halfway, so half of what they miss each other by is seen in each. 0: no such gate.
+    double max_unit_px = 1.1;
+    double ground_height_m = 0; // t_h: lower points are ground; 0: height_share of the mean camera height
     double height_share = 0.006;
     // A point within so many sigma_Z of Z = 0 is ground as well, unless it is higher than max_ground_height_share of
     // the mean camera height: where its matches call it ground, and where they call it obstacle.
@@ -40,6 +46,7 @@ struct TrackOptions {
     double max_ground_height_share = 0.03;
     double area_slack = 0.02;      // of the area's diagonal; points farther outside are dropped
     double max_sigma_share = 0.05; // of the area's diagonal; less certain points are dropped
+    double lonely_share = 0.03;    // of the area's diagonal: a point of two views without another so near is in doubt
     void check() const;
 };
 

@@ -11,6 +11,8 @@
 
 #include <gtest/gtest.h>
 
+#include "site/neighbours.h"
+
 namespace outcrop {
 namespace {
 
@@ -136,12 +138,80 @@ TEST(SpanningEdges, cut_at_t_m_leave_as_many_trees_as_there_are_clusters)
 {
     std::mt19937 rng(kSeed + 1);
     const std::vector<Vector3d> points = random_points(100, &rng);
-    const std::vector<double> edges = spanning_edges(points);
+    const std::vector<double> edges = spanning_edges(points, 10);
     ASSERT_EQ(edges.size(), 99u);
     EXPECT_TRUE(std::is_sorted(edges.begin(), edges.end()));
     for (const double t_m : {0.02, 0.05, 0.1, 0.2}) {
         const auto longer = std::count_if(edges.begin(), edges.end(), [&](double e) { return e > t_m; });
         EXPECT_EQ(as_sets(single_linkage(points, t_m)).size(), static_cast<std::size_t>(longer + 1)) << t_m;
+    }
+}
+
+// Prim's algorithm on the full graph.
+std::vector<double> full_spanning_edges(const std::vector<Vector3d> &points)
+{
+    std::vector<double> edges, nearest(points.size(), std::numeric_limits<double>::infinity());
+    std::vector<char> is_in(points.size(), 0);
+    std::size_t last = 0;
+    is_in[0] = 1;
+    while (edges.size() + 1 < points.size()) {
+        std::size_t next = 0;
+        double least = std::numeric_limits<double>::infinity();
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            if (is_in[i]) continue;
+            nearest[i] = std::min(nearest[i], (points[i] - points[last]).norm());
+            if (nearest[i] < least) least = nearest[i], next = i;
+        }
+        is_in[next] = 1;
+        edges.push_back(least);
+        last = next;
+    }
+    std::sort(edges.begin(), edges.end());
+    return edges;
+}
+
+TEST(SpanningEdges, are_those_of_the_full_graph_up_to_the_reach)
+{
+    std::mt19937 rng(kSeed + 2);
+    for (const int n : {2, 7, 60, 300}) {
+        const std::vector<Vector3d> points = random_points(n, &rng);
+        const std::vector<double> full = full_spanning_edges(points);
+        for (const double reach : {0.01, 0.06, 0.2, 5.0}) {
+            const std::vector<double> edges = spanning_edges(points, reach);
+            ASSERT_EQ(edges.size(), full.size());
+            for (std::size_t i = 0; i < full.size(); ++i) {
+                if (full[i] <= reach) {
+                    EXPECT_NEAR(edges[i], full[i], 1e-12) << n << " points, reach " << reach;
+                } else {
+                    EXPECT_TRUE(std::isinf(edges[i])) << n << " points, reach " << reach;
+                }
+            }
+            EXPECT_EQ(automatic_threshold(edges, reach / 4, reach), automatic_threshold(full, reach / 4, reach));
+        }
+    }
+    EXPECT_TRUE(spanning_edges({}, 1).empty());
+    EXPECT_TRUE(spanning_edges({{1, 2, 3}}, 1).empty());
+}
+
+TEST(Neighbours, are_those_that_a_search_of_all_pairs_finds)
+{
+    std::mt19937 rng(kSeed + 3);
+    const std::vector<Vector3d> points = random_points(150, &rng);
+    for (const double reach : {0.0, 0.03, 0.1, 0.4}) {
+        std::size_t n = 0;
+        std::vector<char> has(points.size(), 0);
+        for (std::size_t i = 0; i < points.size(); ++i)
+            for (std::size_t j = i + 1; j < points.size(); ++j)
+                if ((points[i] - points[j]).norm() <= reach) ++n, has[i] = has[j] = 1;
+        const std::vector<Neighbours> found = neighbours_within(points, reach);
+        EXPECT_EQ(found.size(), n) << reach;
+        EXPECT_EQ(has_neighbour(points, reach), has) << reach;
+        for (std::size_t k = 0; k < found.size(); ++k) {
+            EXPECT_LT(found[k].a, found[k].b);
+            if (k > 0) {
+                EXPECT_LE(found[k - 1].distance, found[k].distance);
+            }
+        }
     }
 }
 
@@ -198,6 +268,7 @@ TEST(ClusterPoints, joins_the_halves_of_a_torn_body_but_lets_no_stray_point_in)
     std::vector<SitePoint> points;
     for (const double x : {0.0, 0.1, 0.2, 0.3, 0.6}) points.push_back(at(x, 0, 0.2));
     for (const double x : {1.04, 1.14, 1.24, 1.34, 1.44}) points.push_back(at(x, 0, 0.2));
+    for (SitePoint &p : points) p.n_views = 3;
     points.push_back(at(1.92, 0, 0.2));
     const Clusters joined = cluster_points(points, 14);
     EXPECT_NEAR(joined.t_m_m, std::sqrt(0.3 * 0.44), 1e-9);
@@ -236,6 +307,30 @@ TEST(ClusterPoints, reaches_farther_between_uncertain_points_when_asked)
     EXPECT_EQ(cluster_points(points, 10, options).groups.size(), 2u);
     options.covariance_sigmas = 1;
     EXPECT_EQ(cluster_points(points, 10, options).groups.size(), 1u);
+}
+
+TEST(ClusterPoints, lets_no_stray_make_one_body_of_two)
+{
+    // Two bodies 0.5 apart, t_M 0.3, and one point half way that only two views agree on.
+    std::vector<SitePoint> points;
+    for (int i = 0; i < 6; ++i) points.push_back(at(0.01 * i, 0, 0.1)), points.push_back(at(0.55 + 0.01 * i, 0, 0.1));
+    for (SitePoint &p : points) p.n_views = 3;
+    points.push_back(at(0.29, 0, 0.1));
+    ClusterOptions options;
+    options.t_m_m = 0.3;
+    const Clusters apart = cluster_points(points, 10, options);
+    ASSERT_EQ(apart.groups.size(), 2u);
+    EXPECT_EQ(apart.label.back(), apart.label[0]) << "it belongs to the nearer";
+    points.back().n_views = 3;
+    EXPECT_EQ(cluster_points(points, 10, options).groups.size(), 1u) << "three views are no accident";
+    points.back().is_doubtful = true;
+    EXPECT_EQ(cluster_points(points, 10, options).groups.size(), 2u);
+    options.min_company = 0;
+    EXPECT_EQ(cluster_points(points, 10, options).groups.size(), 1u);
+    // A body of strays only is a body all the same.
+    std::vector<SitePoint> thin;
+    for (int i = 0; i < 6; ++i) thin.push_back(at(0.25 * i, 0, 0.1));
+    EXPECT_EQ(cluster_points(thin, 10, ClusterOptions{}).groups.size(), 1u);
 }
 
 TEST(ClusterPoints, takes_no_points_and_refuses_bad_options)

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Which points in space lie near each other.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace outcrop {
+
+struct Neighbours {
+    int a = 0, b = 0; // a < b
+    double distance = 0;
+};
+
+// All pairs not farther apart than reach, ascending (distance, a, b). O(n log n + pairs).
+std::vector<Neighbours> neighbours_within(const std::vector<Eigen::Vector3d> &points, double reach);
+
+// Per point: is another one within reach?
+std::vector<char> has_neighbour(const std::vector<Eigen::Vector3d> &points, double reach);
+
+} // namespace outcrop
