@@ -128,6 +128,20 @@ TEST_F(Export, NumbersReadBackAreTheNumbersWritten)
     EXPECT_EQ(json::parse(text("model/ground.json"))["codes"].size(), 4u);
 }
 
+TEST_F(Export, WhatTheModelSaysOfItselfIsWritten)
+{
+    write();
+    EXPECT_TRUE(json::parse(text("model/obstacles.json"))["quality"].empty());
+    model_.quality = {
+        {"one_view", "One \"view\" alone.", Severity::kFault}, {"b", "c", Severity::kWarning}, {"d", "e"}};
+    write();
+    const json quality = json::parse(text("model/obstacles.json"))["quality"];
+    ASSERT_EQ(quality.size(), 3u);
+    EXPECT_EQ(quality[0], (json{{"code", "one_view"}, {"text", "One \"view\" alone."}, {"severity", "fault"}}));
+    EXPECT_EQ(quality[1]["severity"], "warning");
+    EXPECT_EQ(quality[2]["severity"], "note");
+}
+
 TEST_F(Export, ImagesKeepColourAndWhatIsUnseen)
 {
     write();

@@ -294,5 +294,36 @@ TEST(Tracks, settled_with_the_true_poses_keep_the_corners_and_drop_wrong_sightin
     EXPECT_GE(std::count(is_found.begin(), is_found.end(), 1), 110);
 }
 
+TEST(Tracks, of_two_views_are_in_doubt_when_they_meet_loosely_or_stand_alone)
+{
+    std::mt19937 rng(kSeed);
+    const std::vector<Corner> corners = {{{0.10, 0.10, 0.10}, false, 0}, {{0.12, 0.10, 0.10}, false, 0}};
+    Scene scene = make_scene(corners, margin_of(0, 0), 0, &rng);
+    ASSERT_EQ(scene.shown[1].size(), 2u);
+    ASSERT_EQ(scene.shown[3].size(), 2u);
+    const auto track = [](int junction) {
+        Track t;
+        t.pixels = {{1, junction}, {3, junction}};
+        return t;
+    };
+    const auto settle = [&](const std::vector<Track> &tracks) {
+        return settle_tracks(scene.views, scene.truth, {}, tracks, kArea, {});
+    };
+    for (const Track &t : settle({track(0), track(1)})) EXPECT_FALSE(t.is_doubtful);
+    const std::vector<Track> alone = settle({track(0)});
+    ASSERT_EQ(alone.size(), 1u) << "kept as a sign all the same";
+    EXPECT_TRUE(alone[0].is_doubtful);
+    // Off the epipolar line, whichever way that runs, by more than two pixels of noise: still near enough to be kept.
+    int n_doubted = 0;
+    const oc_junction_t at_rest = scene.views[3].junctions[0];
+    for (const double angle : {0.0, 45.0, 90.0, 135.0}) {
+        scene.views[3].junctions[0].x_px = at_rest.x_px + static_cast<float>(2.5 * std::cos(angle * kDegree));
+        scene.views[3].junctions[0].y_px = at_rest.y_px + static_cast<float>(2.5 * std::sin(angle * kDegree));
+        for (const Track &t : settle({track(0), track(1)})) n_doubted += t.is_doubtful;
+    }
+    EXPECT_GE(n_doubted, 1);
+    EXPECT_LE(n_doubted, 4) << "along the line nothing can be told";
+}
+
 } // namespace
 } // namespace outcrop
