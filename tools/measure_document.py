@@ -365,8 +365,10 @@ def times_section(result):
 
 
 def text(result, bench=None, soak=None, matching=None):
+    import shape_document  # here: it is written with the helpers above
+
     """bench, soak, matching: what docs/bench.json, soak.json and matching.json hold, whose parts stand at the end."""
     parts = [head_section(result), targets_section(result), same_boxes_section(result), seeds_section(result),
-             sites_section(result), repeats_section(result), real_section(result), times_section(result)]
+             shape_document.text(result), sites_section(result), repeats_section(result), real_section(result), times_section(result)]
     parts += [soak_document.text(soak), matching_document.text(matching), bench_document.text(bench) if bench else ""]
     return "".join(parts).rstrip() + "\n"

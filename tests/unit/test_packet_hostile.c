@@ -296,14 +296,40 @@ static void forged_distortion_is_refused(void)
     TEST_ASSERT_EQUAL(OC_E_FORMAT, forge_view(true, (double)INFINITY, fields, 6));
 }
 
-static void forged_relabels_and_resends_are_refused(void)
+static void forged_relabels_are_refused(void)
 {
     TEST_ASSERT_EQUAL(OC_OK, FORGE(OC_PACKET_RELABEL, {5, 16}, {1023, 11}, {1, 11}, {0, 2}, {0, 1}));
     TEST_ASSERT_EQUAL(OC_E_FORMAT, FORGE(OC_PACKET_RELABEL, {5, 16}, {0, 11}, {0, 11}, {0, 2}));
     TEST_ASSERT_EQUAL(OC_E_FORMAT, FORGE(OC_PACKET_RELABEL, {5, 16}, {1024, 11}, {1, 11}, {0, 2}, {0, 1}));
     TEST_ASSERT_EQUAL(OC_E_FORMAT, FORGE(OC_PACKET_RELABEL, {5, 16}, {0, 11}, {1, 11}, {3, 2}, {0, 1}));
-    TEST_ASSERT_EQUAL(OC_OK, FORGE(OC_PACKET_RESEND_REQUEST, {5, 16}, {1, 32}));
-    TEST_ASSERT_EQUAL(OC_E_FORMAT, FORGE(OC_PACKET_RESEND_REQUEST, {5, 16}, {0, 32}));
+}
+
+/* The head of a silhouette: view, key, box, step (uniform of 5), col, row, columns - 1, rows - 1. */
+#define SILHOUETTE_HEAD(col, cols)                                                                                     \
+    {5, 16}, {6, 16}, {3, 5}, {0, 2}, {col, 12}, {0, 12}, {(cols)-1u, 12},                                             \
+    {                                                                                                                  \
+        0, 12                                                                                                          \
+    }
+
+static void forged_silhouettes_and_textures_are_refused(void)
+{
+    /* Its one row like the ground above it; the last row must not go on beyond the columns. */
+    TEST_ASSERT_EQUAL(OC_OK, FORGE(OC_PACKET_SILHOUETTE, SILHOUETTE_HEAD(4092, 4), {1, 1}));
+    TEST_ASSERT_EQUAL(OC_E_FORMAT, FORGE(OC_PACKET_SILHOUETTE, SILHOUETTE_HEAD(4093, 4), {1, 1}));
+    /* Not the same, one run, yet ground: it could have been the same. */
+    TEST_ASSERT_EQUAL(OC_E_FORMAT, FORGE(OC_PACKET_SILHOUETTE, SILHOUETTE_HEAD(0, 4), {0, 1}, {2, 2}, {3, 2}));
+    TEST_ASSERT_EQUAL(OC_OK, FORGE(OC_PACKET_SILHOUETTE, SILHOUETTE_HEAD(0, 4), {0, 1}, {2, 2}, {2, 2}));
+
+    /* A texture request that cancels, and one without tiles, without budget, of tiles of 15 px. */
+    TEST_ASSERT_EQUAL(OC_OK, FORGE(OC_PACKET_TEXTURE_REQUEST, {5, 16}, {1, 1}));
+    TEST_ASSERT_EQUAL(OC_OK, FORGE(OC_PACKET_TEXTURE_REQUEST, {5, 16}, {0, 1}, {0, 1}, {16, 8}, {40, 7}, {1, 1},
+                                   {9, 24}, {0, 4}, {1, 9}, {0, 1}));
+    TEST_ASSERT_EQUAL(OC_E_FORMAT, FORGE(OC_PACKET_TEXTURE_REQUEST, {5, 16}, {0, 1}, {0, 1}, {16, 8}, {40, 7}, {1, 1},
+                                         {9, 24}, {0, 4}, {0, 9}));
+    TEST_ASSERT_EQUAL(OC_E_FORMAT, FORGE(OC_PACKET_TEXTURE_REQUEST, {5, 16}, {0, 1}, {0, 1}, {16, 8}, {40, 7}, {1, 1},
+                                         {0, 24}, {0, 4}, {1, 9}, {0, 1}));
+    TEST_ASSERT_EQUAL(OC_E_FORMAT, FORGE(OC_PACKET_TEXTURE_REQUEST, {5, 16}, {0, 1}, {0, 1}, {15, 8}, {40, 7}, {1, 1},
+                                         {9, 24}, {0, 4}, {1, 9}, {0, 1}));
 }
 
 /* A gap of the Rice code with its escape. */
@@ -392,7 +418,8 @@ int main(void)
     RUN_TEST(forged_junctions_are_refused);
     RUN_TEST(forged_ties_are_refused);
     RUN_TEST(forged_distortion_is_refused);
-    RUN_TEST(forged_relabels_and_resends_are_refused);
+    RUN_TEST(forged_relabels_are_refused);
+    RUN_TEST(forged_silhouettes_and_textures_are_refused);
     RUN_TEST(forged_block_indices_are_refused);
     RUN_TEST(forged_patches_are_refused);
     RUN_TEST(forged_overhead_requests_are_refused);
