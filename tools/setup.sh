@@ -18,7 +18,7 @@ packages=(
     libgtest-dev libgmock-dev libbenchmark-dev
     gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static
     clang-14 libclang-rt-14-dev valgrind
-    ffmpeg iproute2 util-linux
+    assimp-utils ffmpeg iproute2 util-linux
     qemu-system-x86 busybox-static kmod cpio libelf1 systemd udev v4l-utils groff-base
     python3 python3-pip python3-numpy
     ca-certificates debian-archive-keyring dpkg-dev xz-utils
