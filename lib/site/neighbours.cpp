@@ -70,4 +70,21 @@ std::vector<char> has_neighbour(const std::vector<Vector3d> &points, double reac
     return has;
 }
 
+std::vector<std::vector<int>> nearest_of(const std::vector<Vector3d> &points, const std::vector<Vector3d> &queries,
+                                         std::size_t k)
+{
+    std::vector<std::vector<int>> all(queries.size());
+    if (points.empty() || k == 0) return all;
+    const Cloud cloud{points};
+    Tree tree(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(10));
+    tree.buildIndex();
+    std::vector<std::uint32_t> found(k);
+    std::vector<double> squares(k);
+    for (std::size_t q = 0; q < queries.size(); ++q) {
+        const std::size_t n = tree.knnSearch(queries[q].data(), k, found.data(), squares.data());
+        for (std::size_t i = 0; i < n; ++i) all[q].push_back(static_cast<int>(found[i]));
+    }
+    return all;
+}
+
 } // namespace outcrop

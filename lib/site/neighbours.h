@@ -19,4 +19,8 @@ std::vector<Neighbours> neighbours_within(const std::vector<Eigen::Vector3d> &po
 // Per point: is another one within reach?
 std::vector<char> has_neighbour(const std::vector<Eigen::Vector3d> &points, double reach);
 
+// For each of the queries the k nearest points (fewer when there are fewer), nearest first. O((n + queries) log n).
+std::vector<std::vector<int>> nearest_of(const std::vector<Eigen::Vector3d> &points,
+                                         const std::vector<Eigen::Vector3d> &queries, std::size_t k);
+
 } // namespace outcrop

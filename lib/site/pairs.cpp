@@ -4,9 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <stdexcept>
+#include <utility>
 
 #include <Eigen/Core>
+
+#include "site/neighbours.h"
 
 namespace outcrop {
 namespace {
@@ -82,6 +86,66 @@ bool rate(const Sight &left, const Sight &right, const PairOptions &options, Vie
     return true;
 }
 
+// Where a view looks, and from which side.
+struct Gaze {
+    Eigen::Vector2d at = Eigen::Vector2d::Zero(); // mean of the sample points it sees
+    int side = 0;                                 // which of kSides it stands on, seen from there
+};
+
+constexpr int kSides = 12, kSidesApart = 2; // two sides apart is up to 90 degrees
+constexpr std::size_t kNearestPerSide = 10;
+
+Gaze gaze_of(const Sight &sight, const std::vector<Eigen::Vector3d> &points, const PosedView &posed)
+{
+    Gaze gaze;
+    for (std::size_t i = 0; i < points.size(); i++)
+        if (sight.is_seen[i]) gaze.at += points[i].head<2>() / sight.n_seen;
+    Eigen::Vector3d centre;
+    oc_pose_centre(&posed.camera.pose, centre.data());
+    const Eigen::Vector2d from = centre.head<2>() - gaze.at;
+    const double turn = std::atan2(from.y(), from.x()) / (2 * 3.14159265358979323846);
+    gaze.side = static_cast<int>(std::floor((turn - std::floor(turn)) * kSides)) % kSides;
+    return gaze;
+}
+
+// Pairs worth rating when there are too many views for all of them: for each view, those that look at the nearest
+// places from its own side and the two on either hand. Ascending, each once.
+std::vector<std::pair<int, int>> likely_pairs(const std::vector<Sight> &sights,
+                                              const std::vector<Eigen::Vector3d> &points,
+                                              const std::vector<PosedView> &views)
+{
+    std::vector<Gaze> gazes;
+    std::vector<std::vector<int>> of_side(kSides);
+    std::vector<std::vector<Eigen::Vector3d>> places(kSides);
+    for (std::size_t i = 0; i < views.size(); i++) {
+        gazes.push_back(gaze_of(sights[i], points, views[i]));
+        if (sights[i].n_seen == 0) continue;
+        const auto side = static_cast<std::size_t>(gazes[i].side);
+        of_side[side].push_back(static_cast<int>(i));
+        places[side].emplace_back(gazes[i].at.x(), gazes[i].at.y(), 0);
+    }
+    std::set<std::pair<int, int>> pairs;
+    for (int side = 0; side < kSides; side++) {
+        const auto there = static_cast<std::size_t>(side);
+        std::vector<int> askers;
+        std::vector<Eigen::Vector3d> queries;
+        for (std::size_t i = 0; i < views.size(); i++) {
+            const int apart = std::abs(gazes[i].side - side);
+            if (sights[i].n_seen == 0 || std::min(apart, kSides - apart) > kSidesApart) continue;
+            askers.push_back(static_cast<int>(i));
+            queries.emplace_back(gazes[i].at.x(), gazes[i].at.y(), 0);
+        }
+        const auto nearest = nearest_of(places[there], queries, kNearestPerSide + 1);
+        for (std::size_t q = 0; q < askers.size(); q++) {
+            for (const int k : nearest[q]) {
+                const int i = askers[q], j = of_side[there][static_cast<std::size_t>(k)];
+                if (j != i) pairs.insert({std::min(i, j), std::max(i, j)});
+            }
+        }
+    }
+    return {pairs.begin(), pairs.end()};
+}
+
 void check(const Area &area, const PairOptions &options)
 {
     const bool area_ok = area.x_max > area.x_min && area.y_max > area.y_min && area.z_max >= 0;
@@ -115,13 +179,17 @@ std::vector<ViewPair> select_pairs(const std::vector<PosedView> &views, const Ar
 
     std::vector<ViewPair> rated;
     const int n = static_cast<int>(views.size());
-    for (int i = 0; i < n; i++) {
-        for (int j = i + 1; j < n; j++) {
-            ViewPair pair;
-            pair.left = i;
-            pair.right = j;
-            if (rate(sights[i], sights[j], options, &pair)) rated.push_back(pair);
-        }
+    const auto add = [&](int i, int j) {
+        ViewPair pair;
+        pair.left = i;
+        pair.right = j;
+        if (rate(sights[i], sights[j], options, &pair)) rated.push_back(pair);
+    };
+    if (n <= options.exhaustive_views) {
+        for (int i = 0; i < n; i++)
+            for (int j = i + 1; j < n; j++) add(i, j);
+    } else {
+        for (const auto &[i, j] : likely_pairs(sights, points, views)) add(i, j);
     }
 
     // A pair stays while one of its views still has room; best pairs are asked first.

@@ -3,6 +3,7 @@
 #include "site/pairs.h"
 
 #include <cmath>
+#include <cstdio>
 #include <random>
 #include <set>
 #include <stdexcept>
@@ -77,6 +78,41 @@ TEST(SelectPairs, WorkGrowsLinearlyWithTheViews)
     for (const int n : {8, 24, 72}) {
         const std::vector<View> views = ring(n);
         EXPECT_LE(select_pairs(posed(views), scene::area(), options).size(), static_cast<std::size_t>(4 * n)) << n;
+    }
+}
+
+double worth_of(const std::vector<ViewPair> &pairs)
+{
+    double sum = 0;
+    for (const ViewPair &pair : pairs) sum += pair.worth;
+    return sum;
+}
+
+// Many views: what the index proposes is worth nearly as much as the best of all pairs. A ring so dense that the nearest
+// neighbours have no parallax, and a drive across a wide site.
+TEST(SelectPairs, TheIndexFindsPairsAsGoodAsAllOfThem)
+{
+    const unsigned seed = 7;
+    std::printf("seed %u\n", seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> unit(0, 1);
+    std::vector<View> wide(200);
+    for (std::size_t i = 0; i < wide.size(); i++) {
+        const Eigen::Vector3d at(12 * unit(random) - 6, 12 * unit(random) - 6, 0.3);
+        const double a = 6.2832 * unit(random);
+        wide[i].id = static_cast<int>(i);
+        wide[i].camera = scene::look_at(at + Eigen::Vector3d(2 * std::cos(a), 2 * std::sin(a), 1), at);
+    }
+    for (const auto &[views, area] :
+         {std::pair{ring(150), scene::area()}, std::pair{wide, Area{-6, 6, -6, 6, 1}}}) {
+        PairOptions all, indexed;
+        all.exhaustive_views = 1000;
+        indexed.exhaustive_views = 10;
+        const std::vector<ViewPair> best = select_pairs(posed(views), area, all);
+        const std::vector<ViewPair> found = select_pairs(posed(views), area, indexed);
+        EXPECT_GT(best.size(), views.size());
+        EXPECT_GT(worth_of(found), 0.9 * worth_of(best)) << views.size();
+        EXPECT_LE(found.size(), indexed.best_per_view * views.size());
     }
 }
 

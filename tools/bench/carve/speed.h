@@ -8,7 +8,7 @@
 
 namespace outcrop::bench {
 
-// Google Benchmark rows: silhouettes alone, with colour, mesh, drawing; at a million voxels from at most eight views.
+// Google Benchmark rows: one silhouette in each view, then carving by silhouettes alone, with colour, mesh, drawing; at a million voxels from at most eight views.
 void run_speed(const Obstacle &box, std::vector<CarveView> views);
 
 } // namespace outcrop::bench
