@@ -103,8 +103,7 @@ TEST(SelectPairs, TheIndexFindsPairsAsGoodAsAllOfThem)
         wide[i].id = static_cast<int>(i);
         wide[i].camera = scene::look_at(at + Eigen::Vector3d(2 * std::cos(a), 2 * std::sin(a), 1), at);
     }
-    for (const auto &[views, area] :
-         {std::pair{ring(150), scene::area()}, std::pair{wide, Area{-6, 6, -6, 6, 1}}}) {
+    for (const auto &[views, area] : {std::pair{ring(150), scene::area()}, std::pair{wide, Area{-6, 6, -6, 6, 1}}}) {
         PairOptions all, indexed;
         all.exhaustive_views = 1000;
         indexed.exhaustive_views = 10;

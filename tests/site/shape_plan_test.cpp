@@ -74,7 +74,8 @@ std::map<std::pair<int, int>, int> asked(const std::vector<SilhouettePlan> &plan
 TEST(PlanSilhouettes, OneRequestHoldsASmallSite)
 {
     Ring ring(14);
-    for (int i = 0; i < 5; i++) ring.model.obstacles.push_back(box_at(i + 1, 0.8 * std::cos(i * 1.2), 0.8 * std::sin(i * 1.2)));
+    for (int i = 0; i < 5; i++)
+        ring.model.obstacles.push_back(box_at(i + 1, 0.8 * std::cos(i * 1.2), 0.8 * std::sin(i * 1.2)));
     ring.model.suspected.push_back(box_at(1, 0, 0));
     const auto plans = plan_silhouettes(ring.model, ring.views, {});
     ASSERT_EQ(plans.size(), 1u);
@@ -83,8 +84,8 @@ TEST(PlanSilhouettes, OneRequestHoldsASmallSite)
     // The steps lead from the reported pose to the refined one.
     for (int v = 0; v < plans[0].request.n_views; v++) {
         const oc_pose_step_t &step = plans[0].request.views[v];
-        const Vector3d moved = camera_centre(ring.views.at(step.view).camera) +
-                               Vector3d(step.move_m[0], step.move_m[1], step.move_m[2]);
+        const Vector3d moved =
+            camera_centre(ring.views.at(step.view).camera) + Vector3d(step.move_m[0], step.move_m[1], step.move_m[2]);
         EXPECT_LT((moved - camera_centre(ring.model.views[static_cast<std::size_t>(v)].camera)).norm(), 1e-9);
     }
 }
@@ -96,7 +97,8 @@ TEST(PlanSilhouettes, EveryObstacleInEveryViewWhateverTheDatagram)
             Ring ring(20);
             std::mt19937 random(static_cast<unsigned>(n_boxes));
             std::uniform_real_distribution<double> place(-1, 1);
-            for (int i = 0; i < n_boxes; i++) ring.model.obstacles.push_back(box_at(i + 1, place(random), place(random)));
+            for (int i = 0; i < n_boxes; i++)
+                ring.model.obstacles.push_back(box_at(i + 1, place(random), place(random)));
             ShapeOptions options;
             options.datagram_bytes = bytes;
             const auto plans = plan_silhouettes(ring.model, ring.views, options);

@@ -54,8 +54,8 @@ public:
         for (const CarveView &view : views) {
             if (view.rgb.empty()) continue;
             const auto w = static_cast<std::uint32_t>(view.rgb.cols), h = static_cast<std::uint32_t>(view.rgb.rows);
-            sights_.push_back({{view.rgb.ptr<std::uint8_t>(0), w, h, static_cast<std::uint32_t>(view.rgb.step[0]), 3},
-                               view.camera});
+            sights_.push_back(
+                {{view.rgb.ptr<std::uint8_t>(0), w, h, static_cast<std::uint32_t>(view.rgb.step[0]), 3}, view.camera});
             width = std::max(width, w), height = std::max(height, h);
         }
         if (sights_.empty()) return;
