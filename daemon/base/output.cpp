@@ -81,12 +81,13 @@ void write_report(const std::string &path, const json &report)
     std::filesystem::rename(part, path);
 }
 
-// For the ground map: what the points said stays doubtful ground where the volume says otherwise.
-SiteModel with_points_boxes(SiteModel finished, const SiteModel &model)
+// What the points said stays doubtful ground where the volume says otherwise.
+std::vector<Obstacle> points_boxes(const SiteModel &finished, const SiteModel &model)
 {
+    std::vector<Obstacle> boxes;
     for (std::size_t i = 0; i < finished.obstacles.size(); i++)
-        if (finished.obstacles[i].voxel_m > 0) finished.suspected.push_back(model.obstacles[i]);
-    return finished;
+        if (finished.obstacles[i].voxel_m > 0) boxes.push_back(model.obstacles[i]);
+    return boxes;
 }
 
 } // namespace
@@ -130,7 +131,7 @@ void write_output(Session &session, const Ledger &ledger, const ReceiveCounts &r
     ms["carve"] = carve_watch.ms();
 
     Stopwatch map_watch;
-    const GroundMap ground = map_ground(with_points_boxes(finished, model));
+    const GroundMap ground = map_ground(finished, {}, points_boxes(finished, model));
     int n_bad_tiles = 0;
     const OverheadMap overhead = compose_overhead(model, session.tiles(), {}, &n_bad_tiles);
     ms["overhead"] = map_watch.ms();

@@ -43,11 +43,13 @@ public:
         blockers_ = blockers_of(model, 0);
     }
 
-    GroundMap paint()
+    GroundMap paint(const std::vector<Obstacle> &doubtful)
     {
         paint_free();
         paint_points();
         paint_suspects();
+        for (const Obstacle &box : doubtful)
+            paint_footprint(box, doubt(), GroundCode::kSuspected);
         paint_boxes(model_.suspected, true);
         paint_boxes(model_.obstacles, true);
         paint_boxes(model_.obstacles, false);
@@ -174,18 +176,19 @@ private:
                });
     }
 
+    // Half a cell's diagonal, so that no cell that a box touches stays free.
+    double half_cell() const { return map_.metres_per_pixel * std::sqrt(0.5); }
+    double doubt() const { return half_cell() + options_.pose_sigmas * pose_sigma_; }
+
     void paint_boxes(const std::vector<Obstacle> &boxes, bool is_ring)
     {
-        // Half a cell's diagonal, so that no cell that the box touches stays free.
-        const double half_cell = map_.metres_per_pixel * std::sqrt(0.5);
-        const double doubt = half_cell + options_.pose_sigmas * pose_sigma_;
         for (const Obstacle &box : boxes) {
             if (!is_ring) {
-                paint_footprint(box, half_cell, GroundCode::kObstacle);
+                paint_footprint(box, half_cell(), GroundCode::kObstacle);
                 continue;
             }
-            paint_footprint(box, doubt + ring_share(box) * box.obb_size.head<2>().norm(), GroundCode::kSuspected);
-            paint_footprint(with_suspects(box), doubt, GroundCode::kSuspected);
+            paint_footprint(box, doubt() + ring_share(box) * box.obb_size.head<2>().norm(), GroundCode::kSuspected);
+            paint_footprint(with_suspects(box), doubt(), GroundCode::kSuspected);
         }
     }
 
@@ -209,10 +212,10 @@ void GroundMapOptions::check() const
         throw std::invalid_argument("ground map: border_px must be >= 0, max_cells_per_side >= 1");
 }
 
-GroundMap map_ground(const SiteModel &model, const GroundMapOptions &options)
+GroundMap map_ground(const SiteModel &model, const GroundMapOptions &options, const std::vector<Obstacle> &doubtful)
 {
     options.check();
-    return Painter(model, options).paint();
+    return Painter(model, options).paint(doubtful);
 }
 
 } // namespace outcrop

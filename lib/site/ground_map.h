@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include <opencv2/core.hpp>
 
@@ -39,6 +40,9 @@ struct GroundMap {
 // obstacle point that no box holds, or at a suspect place; the ring reaches out to suspect places beside the box. A
 // model with a fault has no free ground: it is suspected instead. free: else, and seen by min_views views whose line of sight meets no box.
 // Everything else is unseen. Cost: cells * views * boxes.
-GroundMap map_ground(const SiteModel &model, const GroundMapOptions &options = {});
+// doubtful: footprints that are suspected besides, but stand in nobody's way and have no ring: the points' box of an
+// obstacle whose volume was carved.
+GroundMap map_ground(const SiteModel &model, const GroundMapOptions &options = {},
+                     const std::vector<Obstacle> &doubtful = {});
 
 } // namespace outcrop
