@@ -254,9 +254,8 @@ static void evidence_fill(oc_silhouette_ws_t *ws, size_t n)
         const float difference = fminf((float)ws->difference[i] * 0.25f, MAX_DIFFERENCE);
         const float e =
             DIFFERENCE_WEIGHT * difference - LIKENESS_WEIGHT * (float)ws->likeness[i] * 0.01f + EVIDENCE_OFFSET;
-        ws->evidence[i] = is_judged(ws, i) > 0.0f
-                              ? (int16_t)(fminf(fmaxf(e, -MAX_EVIDENCE), MAX_EVIDENCE) * EVIDENCE_SCALE)
-                              : (int16_t)0;
+        const float kept = is_judged(ws, i) > 0.0f ? fminf(fmaxf(e, -MAX_EVIDENCE), MAX_EVIDENCE) : 0.0f;
+        ws->evidence[i] = (int16_t)(kept * EVIDENCE_SCALE);
     }
 }
 

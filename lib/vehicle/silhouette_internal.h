@@ -35,7 +35,7 @@ void oc_boxes_clear(uint8_t *bits, uint32_t width_px, uint32_t height_px);
 void oc_boxes_add(uint8_t *bits, uint32_t width_px, uint32_t height_px, const oc_hull_t *hull);
 static inline bool oc_boxes_have(const uint8_t *bits, uint32_t width_px, uint32_t x, uint32_t y)
 {
-    return bits[(size_t)y * ((width_px + 7u) / 8u) + x / 8u] >> (x & 7u) & 1u;
+    return ((uint32_t)bits[(size_t)y * ((width_px + 7u) / 8u) + x / 8u] >> (x & 7u) & 1u) != 0;
 }
 
 /* One comparison: the rectangle of the view, and a reference. */
