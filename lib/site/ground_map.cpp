@@ -48,8 +48,7 @@ public:
         paint_free();
         paint_points();
         paint_suspects();
-        for (const Obstacle &box : doubtful)
-            paint_footprint(box, doubt(), GroundCode::kSuspected);
+        for (const Obstacle &box : doubtful) paint_footprint(box, doubt(), GroundCode::kSuspected);
         paint_boxes(model_.suspected, true);
         paint_boxes(model_.obstacles, true);
         paint_boxes(model_.obstacles, false);
