@@ -125,9 +125,12 @@ void write_output(Session &session, const Ledger &ledger, const ReceiveCounts &r
     Stopwatch carve_watch;
     SiteModel finished = model;
     CarveOptions carve;
+    int n_bad_textures = 0;
     if (options.method == "thesis") carve.method = CarveMethod::kThesis;
-    const std::vector<Shape> shapes =
-        carve_shapes(session.carve_views(), session.options().shapes.grow_share, carve, progress, &finished);
+    const std::vector<Shape> shapes = carve_shapes(session.carve_views(&n_bad_textures),
+                                                   session.options().shapes.grow_share, carve, progress, &finished);
+    if (options.represent == "voxels" && shapes.empty() && !finished.obstacles.empty())
+        progress("no silhouettes have come, obstacles stay boxes");
     ms["carve"] = carve_watch.ms();
 
     Stopwatch map_watch;
@@ -159,7 +162,10 @@ void write_output(Session &session, const Ledger &ledger, const ReceiveCounts &r
     report["messages"] = bytes_of(ledger, &LedgerLine::messages);
     report["ms"] = ms;
     report["counts"] = counts_of(session, received);
+    for (const auto &[name, value] : finished.counts) // those of the shapes; the session's own go before
+        if (!report["counts"].contains(name)) report["counts"][name] = value;
     report["counts"]["tiles_bad"] = n_bad_tiles;
+    report["counts"]["textures_bad"] = n_bad_textures;
     report["options"] = {{"method", options.method}, {"path", options.path}, {"null_rival", session.is_null_rival()}};
     if (const auto area = session.area())
         report["options"]["area"] = {area->x_min, area->x_max, area->y_min, area->y_max, area->z_max};

@@ -390,10 +390,11 @@ const SiteModel &Session::settle()
     return model_;
 }
 
-std::vector<std::vector<CarveView>> Session::carve_views()
+std::vector<std::vector<CarveView>> Session::carve_views(int *n_bad)
 {
+    *n_bad = 0;
     if (!options_.with_shapes || rival_ || !is_model_current_) return {};
-    return shapes_.gather(model_, views(), assembler_);
+    return shapes_.gather(model_, views(), assembler_, n_bad);
 }
 
 Asker Session::asker(double now_s)

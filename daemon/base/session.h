@@ -64,8 +64,8 @@ public:
     // views and of those pixels that the views together call for.
     const SiteModel &settle();
 
-    // What the views say about each obstacle of model(); empty without shapes.
-    std::vector<std::vector<CarveView>> carve_views();
+    // What the views say about each obstacle of model(); empty without shapes. n_bad: textures that could not be decoded.
+    std::vector<std::vector<CarveView>> carve_views(int *n_bad);
 
     const std::map<int, View> &views();
     const SiteModel &model() const { return model_; }

@@ -93,21 +93,15 @@ std::vector<std::vector<CarveView>> ShapeDesk::gather_labels(const SiteModel &mo
 }
 
 std::vector<std::vector<CarveView>> ShapeDesk::gather(const SiteModel &model, const std::map<int, View> &views,
-                                                      const PacketAssembler &assembler) const
+                                                      const PacketAssembler &assembler, int *n_bad) const
 {
+    *n_bad = 0;
     auto all = gather_labels(model, views, assembler);
     if (!options_.with_textures) return all;
     const std::vector<TexturePlan> plans = plan_textures(model, all, options_);
     for (std::vector<CarveView> &of_obstacle : all)
-        gather_textures(assembler.textures(), plans, options_, &of_obstacle);
+        *n_bad += gather_textures(assembler.textures(), plans, options_, &of_obstacle);
     return all;
-}
-
-double ShapeDesk::texture_estimate_bytes() const
-{
-    double sum = 0;
-    for (const TexturePlan &plan : textures_) sum += plan.estimate_bytes;
-    return sum;
 }
 
 } // namespace outcrop

@@ -41,10 +41,9 @@ public:
                       const Asker &asker);
 
     // Per obstacle of the model, what the views that answered say; a function of the model and the packets only.
+    // n_bad: textures that are no picture of their size.
     std::vector<std::vector<CarveView>> gather(const SiteModel &model, const std::map<int, View> &views,
-                                               const PacketAssembler &assembler) const;
-
-    double texture_estimate_bytes() const; // of the textures planned
+                                               const PacketAssembler &assembler, int *n_bad) const;
 
 private:
     std::vector<std::vector<CarveView>> gather_labels(const SiteModel &model, const std::map<int, View> &views,

@@ -47,20 +47,28 @@ static void drain(void)
     }
 }
 
+/* View 10 i with a reported centre that is off by so much along X. */
+static void push(int i, double off_m)
+{
+    oc_frame_t frame = {.image = {pixels[i], WIDTH, HEIGHT, WIDTH, 1},
+                        .camera = cameras[i],
+                        .utime_us = 1000000 * (i + 1),
+                        .has_view_id = true,
+                        .view_id = (uint16_t)(10 * i),
+                        .is_forced = true};
+    double centre[3];
+    oc_pose_centre(&cameras[i].pose, centre);
+    centre[0] += off_m;
+    oc_pose_from_centre(cameras[i].pose.R, centre, &frame.camera.pose);
+    for (int k = 0; k < 6; k++) frame.margin.v[k] = k < 3 ? 0.01 : 0.017;
+    oc_push_report_t report;
+    TEST_ASSERT_EQUAL(OC_OK, oc_vehicle_push(vehicle, &frame, &report));
+}
+
 void setUp(void)
 {
     TEST_ASSERT_EQUAL(OC_OK, oc_vehicle_init(&config, block, block_bytes, &vehicle));
-    for (int i = 0; i < N_VIEWS; i++) {
-        oc_frame_t frame = {.image = {pixels[i], WIDTH, HEIGHT, WIDTH, 1},
-                            .camera = cameras[i],
-                            .utime_us = 1000000 * (i + 1),
-                            .has_view_id = true,
-                            .view_id = (uint16_t)(10 * i),
-                            .is_forced = true};
-        for (int k = 0; k < 6; k++) frame.margin.v[k] = k < 3 ? 0.01 : 0.017;
-        oc_push_report_t report;
-        TEST_ASSERT_EQUAL(OC_OK, oc_vehicle_push(vehicle, &frame, &report));
-    }
+    for (int i = 0; i < N_VIEWS; i++) push(i, 0.0);
     drain();
 }
 
@@ -140,18 +148,7 @@ static void steps_are_taken_from_the_reported_pose(void)
 
     TEST_ASSERT_EQUAL(OC_OK, oc_vehicle_init(&config, block, block_bytes, &vehicle));
     for (int i = 0; i < N_VIEWS; i++) {
-        oc_frame_t frame = {.image = {pixels[i], WIDTH, HEIGHT, WIDTH, 1},
-                            .camera = cameras[i],
-                            .utime_us = 1000000 * (i + 1),
-                            .has_view_id = true,
-                            .view_id = (uint16_t)(10 * i),
-                            .is_forced = true};
-        double centre[3];
-        oc_pose_centre(&cameras[i].pose, centre);
-        centre[0] += 0.02 * (i % 3 - 1);
-        oc_pose_from_centre(cameras[i].pose.R, centre, &frame.camera.pose);
-        oc_push_report_t report;
-        TEST_ASSERT_EQUAL(OC_OK, oc_vehicle_push(vehicle, &frame, &report));
+        push(i, 0.02 * (i % 3 - 1));
         r.views[i].turn_rad[2] = 0.0;
         r.views[i].move_m[0] = -0.02 * (i % 3 - 1);
     }

@@ -2,6 +2,7 @@
 // outcrop-drive: both ends on a site folder, over LCM in a private network.
 #include <cstdio>
 #include <exception>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -50,6 +51,8 @@ int main(int argc, char **argv)
     if (angle_deg >= 0) options.site.margin_angle_rad = angle_deg * 0.017453292519943295;
     try {
         outcrop::check_link(options.link);
+        if (options.represent == "voxels" && options.link != "layers")
+            throw std::runtime_error("--as voxels: whole pictures bring no silhouettes, use --link layers");
         if (!perturb.empty()) options.site.perturbation = outcrop::parse_perturbation(perturb);
     } catch (const std::exception &fault) {
         std::fprintf(stderr, "outcrop-drive: %s\n", fault.what());
