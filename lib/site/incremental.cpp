@@ -24,7 +24,7 @@ constexpr double kShareOfBounds = 0.5;
 
 PairMatcher default_matcher(const BuildOptions &options)
 {
-    return [&options](const PosedView &left, const PosedView &right, const Area &area, oc_angle_error_t angles) {
+    return [options](const PosedView &left, const PosedView &right, const Area &area, oc_angle_error_t angles) {
         MatchOptions match = options.match;
         match.strip.angles = angles;
         const PreparedView a(left, match.correlate), b(right, match.correlate);
